@@ -1,0 +1,10 @@
+"""Shapes of the arrays that the public functions take and return."""
+
+from jax import Array
+from jaxtyping import Float
+
+Scalar = Float[Array, ""] | float | int
+Vec2 = Float[Array, "2"]
+Vec3 = Float[Array, "3"]
+Mat2 = Float[Array, "2 2"]
+Mat3 = Float[Array, "3 3"]
