@@ -1,0 +1,1 @@
+"""ggxref: a JAX research toolkit and reference oracle for GGX microfacet models."""
