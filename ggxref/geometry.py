@@ -1,0 +1,72 @@
+"""Directions: reflection, refraction, half vectors, frames."""
+
+import jax.numpy as jnp
+
+from ggxref import stable
+from ggxref._types import Mat3, Scalar, Vec3
+
+
+def reflect(w: Vec3, wm: Vec3) -> Vec3:
+    r"""Mirror direction of `w` about the micronormal: $\omega_o = 2(\omega \cdot \omega_m)\,\omega_m - \omega$.
+
+    - `w`, `wm`: unit, (3,), any side; the result is unit, (3,), and on the other side of `wm`.
+
+    dupuy2023 (5); heitz2014 §2.2 (which prints |ω_i·ω_m|: the same for the front faces that it samples).
+    """
+    return 2 * stable.dot(w, wm) * wm - w
+
+
+def refract(w: Vec3, wm: Vec3, eta: Scalar) -> Vec3:
+    r"""Direction transmitted through a microfacet:
+    $\omega_o = (\eta c - \mathrm{sgn}(c)\sqrt{1 + \eta^2 (c^2 - 1)})\,\omega_m - \eta\,\omega$, $c = \omega \cdot \omega_m$.
+
+    - `w`, `wm`: unit, (3,), any side. `eta = n_i / n_o > 0`, `n_i` on the side of `w`.
+    - Total reflection: the zero vector.
+
+    heitz2014 §2.2, which prints n for n² under the root and takes the sign of ω·n; sgn(c) is the same for the microfacets
+    that `w` can see, and right for every other.
+    """
+    c = stable.dot(w, wm)
+    # (1 - eta)(1 + eta) + (eta c)^2 is the printed radicand without its cancellation at eta = 1.
+    square = (1 - eta) * (1 + eta) + (eta * c) ** 2
+    root = stable.sqrt(square)
+    along = jnp.where(c > 0, eta * c - root, eta * c + root)
+    return jnp.where(square >= 0, along * wm - eta * w, 0)
+
+
+def half_reflection(wi: Vec3, wo: Vec3) -> Vec3:
+    r"""The micronormal that reflects `wi` to `wo`: $\omega_h = (\omega_i + \omega_o)/\|\omega_i + \omega_o\|$.
+
+    - `wi`, `wo`: unit, (3,). The zero vector where `wi = -wo`, which no mirror joins.
+
+    dupuy2023 (6), walter2014 (4).
+    """
+    return jnp.stack(stable.unit(*(wi + wo)))
+
+
+def half_refraction(wi: Vec3, wo: Vec3, n_i: Scalar, n_o: Scalar) -> Vec3:
+    r"""The micronormal that refracts `wi` to `wo`, on the upper side:
+    $\omega_h = \pm (n_i \omega_i + n_o \omega_o)/\|n_i \omega_i + n_o \omega_o\|$ with $\omega_h \cdot n \ge 0$.
+
+    - `wi`, `wo`: unit, (3,), on opposite sides; `n_i`, `n_o > 0`: indices of refraction on their sides.
+    - The zero vector where the sum vanishes (`n_i = n_o` and `wo = -wi`: any microfacet transmits straight on).
+
+    Walter et al. 2007 (16), used by heitz2014 §2.1.
+    """
+    x, y, z = stable.unit(*(n_i * wi + n_o * wo))
+    sign = jnp.where(z < 0, -1, 1).astype(wi.dtype)
+    return jnp.stack([sign * x, sign * y, sign * z])
+
+
+def basis(w: Vec3) -> Mat3:
+    """Orthonormal frame about `w`: the rows (t, b, w), right-handed, so that `basis(w) @ v` are v's coordinates.
+
+    - `w`: unit, (3,), anywhere on the sphere. The result is continuous but at the equator, z = 0.
+
+    Duff et al. 2017, "Building an orthonormal basis, revisited" (Frisvad's, named by walter2014 §4.1, fails near −z).
+    """
+    x, y, z = w
+    s = jnp.where(jnp.signbit(z), -1, 1).astype(w.dtype)
+    a = -1 / (s + z)
+    c = x * y * a
+    return jnp.stack([jnp.stack([1 + s * x * x * a, s * c, -s * x]), jnp.stack([c, s + y * y * a, -y]), w])

@@ -1,0 +1,109 @@
+r"""Masking: Λ, G1 and G2, dimensionless.
+
+Above the horizon $G_1 = (\omega\cdot n)/\sigma(\omega)$ on front faces, with σ the projected area of the faces turned to ω
+(`slopes.sigma_ggx`, `slopes.sigma_beckmann`, `ellipsoid.sigma`). A direction below the horizon looks at the surface from below:
+$\Lambda(\omega) = \Lambda(-\omega)$ and $G_1(\omega, \omega_m) = G_1(-\omega, \omega_m)$ where it sees the microfacet's
+other side (walter2014 (7)), as transmission needs. All directions are unit, (3,); `alpha` is positive, (2,).
+"""
+
+import jax.numpy as jnp
+
+from ggxref import stable
+from ggxref._types import Mat3, Scalar, Vec2, Vec3
+from ggxref.ellipsoid import sigma as sigma_ellipsoid
+from ggxref.slopes import gaussian_area, sigma_beckmann, sigma_ggx
+
+
+def lambda_ggx(w: Vec3, alpha: Vec2) -> Scalar:
+    r"""$\Lambda = (-1 + \sqrt{1 + (\alpha_x^2 x^2 + \alpha_y^2 y^2)/z^2})/2$; infinite at the horizon. tokuyoshi2024."""
+    square = (alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2
+    z = jnp.abs(w[2])
+    return square / (2 * z * (z + stable.sqrt(square + z * z)))  # -1 + sqrt(1 + a²) cancels for small a
+
+
+def lambda_beckmann(w: Vec3, alpha: Vec2) -> Scalar:
+    r"""$\Lambda = (\mathrm{erf}\,a - 1)/2 + e^{-a^2}/(2a\sqrt\pi)$, $a = |z|/\|(\alpha_x x, \alpha_y y)\|$; infinite at the horizon.
+
+    Smith 1967, in heitz2014 §2.1.
+    """
+    return gaussian_area(w, alpha) / jnp.abs(w[2])
+
+
+def _front(w, wm):
+    """χ⁺ of eq. (3) of heitz2014: is this side of the microfacet turned to `w`, seen from w's side of the surface?"""
+    return stable.dot(w, wm) * w[2] > 0
+
+
+def _up(w):
+    """`w`, or `-w` where it points below the horizon."""
+    return jnp.where(w[2] < 0, -w, w)
+
+
+def g1_ggx(w: Vec3, wm: Vec3, alpha: Vec2) -> Scalar:
+    r"""Smith's G1 for GGX: $2|z|/(|z| + \|(\alpha_x x, \alpha_y y, z)\|)$ on front faces, else 0.
+
+    dupuy2023 (15)–(17); tokuyoshi2024 as 1/(1 + Λ).
+    """
+    return jnp.where(_front(w, wm), jnp.abs(w[2]) / sigma_ggx(_up(w), alpha), 0)
+
+
+def g1_beckmann(w: Vec3, wm: Vec3, alpha: Vec2) -> Scalar:
+    r"""Smith's G1 for Beckmann: $1/(1 + \Lambda(\omega))$ on front faces, else 0. heitz2014 §2.1 (Smith 1967)."""
+    sigma = sigma_beckmann(_up(w), alpha)
+    # σ > 0 wherever the face is seen; the inner `where` serves the gradient at w = 0.
+    return jnp.where(_front(w, wm), jnp.abs(w[2]) / jnp.where(sigma > 0, sigma, 1), 0)
+
+
+def g1_v_cavity(w: Vec3, wm: Vec3) -> Scalar:
+    r"""G1 of V-cavities: $\min(1, 2|\omega_m\cdot n||\omega\cdot n|/|\omega\cdot\omega_m|)$ on front faces, else 0.
+
+    heitz2014 (3).
+    """
+    cosine = jnp.abs(stable.dot(w, wm))
+    masked = 2 * jnp.abs(wm[2] * w[2])
+    # Compare before dividing: the quotient overflows where the microfacet is seen edge-on.
+    whole = masked >= cosine
+    g1 = jnp.where(whole, 1, masked / jnp.where(whole, 1, cosine))
+    return jnp.where(_front(w, wm), g1, 0)
+
+
+def g1_ellipsoid(w: Vec3, wm: Vec3, A: Mat3) -> Scalar:
+    r"""Ellipsoid G1: $\min(1, 2\|An\|^2|\omega\cdot n|/(\|A\omega\|\|An\| + A\omega\cdot An))$ on front faces, else 0.
+
+    The minimum acts only where the ellipsoid is skewed: there the visible area is less than the surface's, and a little
+    energy is lost rather than G1 > 1 (walter2014 note 4).
+
+    - `A`: shape matrix, (3, 3), non-singular.
+
+    walter2014 (6), (7), (32).
+    """
+    w_up = _up(w)
+    sigma, z = sigma_ellipsoid(w_up, A), w_up[2]
+    whole = z >= sigma
+    g1 = jnp.where(whole, 1, z / jnp.where(whole, 1, sigma))
+    return jnp.where(_front(w, wm), g1, 0)
+
+
+def g2_separable(g1_i: Scalar, g1_o: Scalar) -> Scalar:
+    r"""Masking and shadowing independent: $G_2 = G_1(\omega_i)\,G_1(\omega_o)$. heitz2014 §2.1, walter2014 (5)."""
+    return g1_i * g1_o
+
+
+def g2_height_correlated(g1_i: Scalar, g1_o: Scalar) -> Scalar:
+    r"""Smith's G2 with correlated heights: $G_iG_o/(G_i + G_o - G_iG_o)$, for reflection; 0 where both are 0.
+
+    dupuy2023 (13).
+    """
+    denominator = g1_i + g1_o * (1 - g1_i)
+    return jnp.where(denominator > 0, g1_i * g1_o / jnp.where(denominator > 0, denominator, 1), 0)
+
+
+def g2_v_cavity(wi: Vec3, wo: Vec3, wm: Vec3) -> Scalar:
+    r"""G2 of V-cavities: $\min(G_1, G_1')$ for reflection ($\omega_o\cdot n > 0$), $\max(G_1 + G_1' - 1, 0)$ for transmission.
+
+    - `wi`: above the horizon. `wm` on the upper side.
+
+    heitz2014 §2.1.
+    """
+    g1_i, g1_o = g1_v_cavity(wi, wm), g1_v_cavity(wo, wm)
+    return jnp.where(wo[2] > 0, jnp.minimum(g1_i, g1_o), jnp.maximum(g1_i + g1_o - 1, 0))

@@ -1,0 +1,88 @@
+r"""Normal distribution functions D: density of micronormals per unit solid angle and unit area of macrosurface [1/sr].
+
+$\int D(\omega_m)\,(\omega_m\cdot n)\,d\omega_m = 1$ (heitz2014 (1)). `wm` is unit, (3,); D is 0 where $\omega_m\cdot n \le 0$.
+`alpha` is $(\alpha_x, \alpha_y)$, positive, (2,).
+"""
+
+import math
+
+import jax.numpy as jnp
+
+from ggxref._types import Mat3, Scalar, Vec2, Vec3
+from ggxref.ellipsoid import cofactor, length, times
+
+
+def hemisphere(wm: Vec3) -> Scalar:
+    r"""$D = \chi^+(\omega_m\cdot n)/\pi$: GGX at α = 1. dupuy2023 (3)."""
+    return jnp.where(wm[2] > 0, 1 / math.pi, 0).astype(wm.dtype)
+
+
+def _stretched(wm, alpha):
+    return (wm[0] / alpha[0]) ** 2 + (wm[1] / alpha[1]) ** 2
+
+
+def ggx(wm: Vec3, alpha: Vec2) -> Scalar:
+    r"""Anisotropic GGX: $D = 1 / (\pi\alpha_x\alpha_y (x^2/\alpha_x^2 + y^2/\alpha_y^2 + z^2)^2)$.
+
+    tokuyoshi2024; dupuy2023 (12); walter2014 (1) with A = diag(αx, αy, 1).
+    """
+    # A sum of squares: cos²(α² − 1) + 1, its equal on unit vectors, has lost every digit at α = 1e-4.
+    q = _stretched(wm, alpha) + wm[2] ** 2
+    D = 1 / (math.pi * (alpha[0] * q) * (alpha[1] * q))
+    return jnp.where(wm[2] > 0, D, 0)
+
+
+def beckmann(wm: Vec3, alpha: Vec2) -> Scalar:
+    r"""Anisotropic Beckmann: $D = \exp(-(x^2/\alpha_x^2 + y^2/\alpha_y^2)/z^2) / (\pi\alpha_x\alpha_y z^4)$.
+
+    heitz2014 §5 (Beckmann slopes over z⁴).
+    """
+    z_square = wm[2] ** 2
+    # z⁴ would underflow to 0/0 towards the horizon; D has underflowed to 0 long before (α < 1e4).
+    seen = (wm[2] > 0) & (z_square > math.sqrt(float(jnp.finfo(wm.dtype).tiny)) * 2)
+    z_square = jnp.where(seen, z_square, 1)
+    D = jnp.exp(-_stretched(wm, alpha) / z_square) / (math.pi * alpha[0] * z_square * (alpha[1] * z_square))
+    return jnp.where(seen, D, 0)
+
+
+def student_t(wm: Vec3, alpha: Vec2, gamma: Scalar) -> Scalar:
+    r"""Student-t slopes: $D = \frac{(\gamma-1)^\gamma}{\pi\alpha_x\alpha_y z^4 (\gamma - 1 + (x^2/\alpha_x^2 + y^2/\alpha_y^2)/z^2)^\gamma}$.
+
+    - `gamma > 1`: 2 is GGX, infinity Beckmann; below 2, D has no bound towards the horizon.
+
+    Ribardière et al. 2017.
+    """
+    # With p = (γ−1)z² + ρ this is ((γ−1) z²/p)^(γ−2) ((γ−1)/p)² / (π αx αy): nothing is divided by z.
+    rho = _stretched(wm, alpha)
+    g = gamma - 1
+    above = wm[2] > 0
+    z_square = jnp.where(above, wm[2], 1) ** 2
+    near = rho < g * z_square
+    # log1p keeps the lobe's digits; towards the horizon ρ/z² would overflow.
+    logarithm = jnp.where(
+        near,
+        -jnp.log1p(jnp.where(near, rho, 0) / (g * z_square)),
+        2 * jnp.log(jnp.where(above, wm[2], 1)) - jnp.log(z_square + rho / g),
+    )
+    q = z_square + rho / g
+    D = jnp.exp((gamma - 2) * logarithm) / (math.pi * (alpha[0] * q) * (alpha[1] * q))
+    return jnp.where(above, D, 0)
+
+
+def ellipsoid(wm: Vec3, A: Mat3) -> Scalar:
+    r"""Ellipsoid NDF: $D = \chi^+(\omega_m\cdot n) / (\pi\,|A|\,\|A n\|\,\|A^{-T}\omega_m\|^4)$.
+
+    Unchanged by `A -> c A` and by `A -> Q A` with `Q` orthogonal; `A = diag(αx, αy, 1)` is anisotropic GGX.
+
+    - `A`: shape matrix, (3, 3), non-singular, of either sign; see `ellipsoid`.
+
+    walter2014 (1).
+    """
+    cof, det = cofactor(A)
+    x, y, z = times(cof, *wm)
+    # Divide before the fourth power: |A|³/‖cof m‖⁴ is the same algebra, but at m = n that power is α⁸, which
+    # underflows float32 below α = 2e-5.
+    x, y, z = x / det, y / det, z / det
+    q = x * x + y * y + z * z
+    D = 1 / (math.pi * (jnp.abs(det) * q) * (length(*A[:, 2]) * q))
+    return jnp.where(wm[2] > 0, D, 0)

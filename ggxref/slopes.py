@@ -1,0 +1,121 @@
+r"""Slope space: the slope of a micronormal is $\tilde m = (-x_m/z_m, -y_m/z_m)$, and P22 its density.
+
+P22 is a density per unit of slope area, dimensionless, and $D(\omega_m) = P^{22}(\tilde m) / (\omega_m\cdot n)^4$.
+`alpha` is $(\alpha_x, \alpha_y)$, positive, (2,). $\sigma(\omega) = \int \max(0, \omega\cdot\omega_m) D(\omega_m)\,d\omega_m$ is the
+projected area of the faces turned to ω, per unit of macrosurface: the normalisation of what ω sees.
+"""
+
+import math
+
+import jax.numpy as jnp
+
+from ggxref import stable
+from ggxref._types import Mat3, Scalar, Vec2, Vec3
+from ggxref.ellipsoid import canonical
+
+
+def from_normal(wm: Vec3) -> Vec2:
+    """Slope of the micronormal `wm`: unit, (3,), above the horizon; the result is (2,). heitz2014 §5.1."""
+    return jnp.stack([-wm[0] / wm[2], -wm[1] / wm[2]])
+
+
+def to_normal(slope: Vec2) -> Vec3:
+    """The micronormal with that slope: unit, (3,). heitz2014 §5.1, algorithm 4 step 5."""
+    return jnp.stack(stable.unit(-slope[0], -slope[1], jnp.ones_like(slope[0])))
+
+
+def stretch(w: Vec3, factors: Vec2) -> Vec3:
+    r"""Direction after stretching the surface: $(\lambda_x x, \lambda_y y, z)$, normalised.
+
+    - `w`: unit, (3,), anywhere on the sphere; `factors`: $(\lambda_x, \lambda_y)$, positive, (2,).
+
+    heitz2014 §5.2; dupuy2023 listing 1 with `factors = alpha`.
+    """
+    return jnp.stack(stable.unit(factors[0] * w[0], factors[1] * w[1], w[2]))
+
+
+def _stretched_square(slope, alpha):
+    return (slope[0] / alpha[0]) ** 2 + (slope[1] / alpha[1]) ** 2
+
+
+def ggx(slope: Vec2, alpha: Vec2) -> Scalar:
+    r"""$P^{22} = 1 / (\pi\alpha_x\alpha_y (1 + \tilde x^2/\alpha_x^2 + \tilde y^2/\alpha_y^2)^2)$. heitz2014 §5."""
+    q = 1 + _stretched_square(slope, alpha)
+    return 1 / (math.pi * (alpha[0] * q) * (alpha[1] * q))
+
+
+def beckmann(slope: Vec2, alpha: Vec2) -> Scalar:
+    r"""$P^{22} = \exp(-\tilde x^2/\alpha_x^2 - \tilde y^2/\alpha_y^2) / (\pi\alpha_x\alpha_y)$. heitz2014 §5."""
+    return jnp.exp(-_stretched_square(slope, alpha)) / (math.pi * alpha[0] * alpha[1])
+
+
+def student_t(slope: Vec2, alpha: Vec2, gamma: Scalar) -> Scalar:
+    r"""$P^{22} = (\gamma-1)^\gamma / (\pi\alpha_x\alpha_y (\gamma-1+\tilde x^2/\alpha_x^2+\tilde y^2/\alpha_y^2)^\gamma)$.
+
+    - `gamma > 1`: 2 is GGX, infinity Beckmann.
+
+    Ribardière et al. 2017.
+    """
+    r = _stretched_square(slope, alpha)
+    return jnp.exp(-gamma * jnp.log1p(r / (gamma - 1))) / (math.pi * alpha[0] * alpha[1])
+
+
+def ellipsoid(slope: Vec2, A: Mat3) -> Scalar:
+    r"""GGX off its centre and sheared: $1 / (\pi|C| (1 + \|C^{-1}(\tilde m + e)\|^2)^2)$ for the canonical `A`.
+
+    The bivariate Student-t density with 2 degrees of freedom, location $-e$ and shape Σ/2 (design: canonical form).
+    """
+    (c00, c10, _), (_, c11, _), (ex, ey, _) = canonical(A)
+    x, y = slope[0] + ex, slope[1] + ey
+    u = x / c00
+    v = (y - c10 * u) / c11
+    q = 1 + u * u + v * v
+    return 1 / (math.pi * (c00 * q) * (c11 * q))
+
+
+def sigma_ggx(w: Vec3, alpha: Vec2) -> Scalar:
+    r"""$\sigma = (z + \|(\alpha_x x, \alpha_y y, z)\|)/2$, for `w` anywhere. dupuy2023 (4) after the stretch."""
+    square = (alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2
+    t = stable.sqrt(square + w[2] ** 2)
+    # Below the horizon t + z cancels.
+    below = w[2] < 0
+    return jnp.where(below, square / jnp.where(below, t - w[2], 1), t + w[2]) / 2
+
+
+def gaussian_area(w, alpha):
+    """`s ierfc(|z|/s) / 2`, s = ‖(αx x, αy y)‖: |z| Λ(w) for Beckmann slopes; 0 at normal incidence."""
+    square = (alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2
+    s = jnp.sqrt(jnp.where(square > 0, square, 1))
+    # From 30 on, ierfc is 0 in every dtype; the limit only stops the overflow of z/s at normal incidence.
+    a = jnp.minimum(jnp.abs(w[2]), 30 * s) / s
+    return jnp.where(square > 0, s * stable.ierfc(a) / 2, 0)
+
+
+def sigma_beckmann(w: Vec3, alpha: Vec2) -> Scalar:
+    r"""$\sigma = z\,(1 + \mathrm{erf}\,a)/2 + s\,e^{-a^2}/(2\sqrt\pi)$, $a = z/s$, $s = \|(\alpha_x x, \alpha_y y)\|$; `w` anywhere.
+
+    Underflows to 0 far below the horizon, where no slope is steep enough to be seen. heitz2014 §5.1 (c).
+    """
+    return jnp.maximum(w[2], 0) + gaussian_area(w, alpha)
+
+
+def _visible(slope, wi, sigma):
+    """Projection factor over its mean; heitz2014 (7) with the signs of its appendix A, as (7) itself has them wrong."""
+    ones = jnp.ones_like(slope[0])
+    factor = stable.dot(wi, jnp.stack([-slope[0], -slope[1], ones]))
+    return jnp.where((factor > 0) & (sigma > 0), factor / jnp.where(sigma > 0, sigma, 1), 0)
+
+
+def visible_ggx(slope: Vec2, wi: Vec3, alpha: Vec2) -> Scalar:
+    r"""Density of the slopes that `wi` sees: $\max(0, -x_i\tilde x - y_i\tilde y + z_i)\,P^{22}(\tilde m)/\sigma(\omega_i)$.
+
+    - `wi`: unit, (3,), anywhere but straight below: from below the horizon it still sees the steepest slopes.
+
+    heitz2014 (7).
+    """
+    return _visible(slope, wi, sigma_ggx(wi, alpha)) * ggx(slope, alpha)
+
+
+def visible_beckmann(slope: Vec2, wi: Vec3, alpha: Vec2) -> Scalar:
+    """`visible_ggx` for Beckmann slopes. heitz2014 (7)."""
+    return _visible(slope, wi, sigma_beckmann(wi, alpha)) * beckmann(slope, alpha)

@@ -1,0 +1,204 @@
+"""Numerical primitives that the formulas stand on: each is here because the plain form loses digits.
+
+Every function takes and returns the dtype of its arguments. Where a derivative is infinite (a square root at 0), the
+derivative returned is 0, so that a gradient never holds NaN.
+"""
+
+import math
+
+import jax
+import jax.numpy as jnp
+from jax import lax
+
+from ggxref._types import Scalar, Vec3
+
+# Bits of the significand that the high half keeps, so that a product of two halves is exact.
+_HIGH = {jnp.dtype("float32"): (jnp.uint32, 0xFFFFF000), jnp.dtype("float64"): (jnp.uint64, 0xFFFFFFFFF8000000)}
+
+
+def _split(a):
+    """`a` as the exact sum of a high half and a low half, each short enough for products without rounding.
+
+    The bits are masked, not subtracted as Veltkamp does: the compiler contracts `c - (c - a)` to FMAs.
+    """
+    integer, mask = _HIGH[a.dtype]
+    high = lax.bitcast_convert_type(lax.bitcast_convert_type(a, integer) & integer(mask), a.dtype)
+    return high, a - high
+
+
+def _two_product(a, b):
+    p = a * b
+    (ah, al), (bh, bl) = _split(a), _split(b)
+    return p, ((ah * bh - p) + ah * bl + al * bh) + al * bl
+
+
+def _two_sum(a, b):
+    s = a + b
+    t = s - a
+    return s, (a - (s - t)) + (b - t)
+
+
+@jax.custom_jvp
+def dot(a: Vec3, b: Vec3) -> Scalar:
+    r"""$a \cdot b$ in twice the working precision, rounded once: shape () from two (3,).
+
+    The plain sum has an unbounded relative error where the vectors are nearly perpendicular, and there stand the
+    factor $\omega_i \cdot \omega_m$ of every visible density and the decision which side of a microfacet is seen.
+    Ogita, Rump & Oishi 2005, algorithm 5.3.
+    """
+    if a.dtype.itemsize == 2:  # every product of two half-precision numbers is a float32
+        return dot(a.astype(jnp.float32), b.astype(jnp.float32)).astype(a.dtype)
+    (p, e), (q, f), (r, g) = (_two_product(x, y) for x, y in zip(a, b, strict=True))
+    s, h = _two_sum(p, q)
+    s, i = _two_sum(s, r)
+    return s + ((e + f + g) + (h + i))
+
+
+@dot.defjvp
+def _dot_jvp(primals, tangents):
+    (a, b), (da, db) = primals, tangents
+    return dot(a, b), (da[0] * b[0] + da[1] * b[1] + da[2] * b[2]) + (a[0] * db[0] + a[1] * db[1] + a[2] * db[2])
+
+
+def sqrt(x: Scalar) -> Scalar:
+    """Square root with derivative 0, not infinity, at `x <= 0`; 0 for negative `x`, which only rounding may make."""
+    # The inner `where` stops the NaN that `0 * inf` would put in the gradient.
+    return jnp.where(x > 0, jnp.sqrt(jnp.where(x > 0, x, 1)), 0)
+
+
+def unit(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """The components divided by their length; the zero vector stays zero, with a zero gradient."""
+    square = x * x + y * y + z * z
+    scale = 1 / jnp.sqrt(jnp.where(square > 0, square, 1))
+    return x * scale, y * scale, z * scale
+
+
+def azimuth(x: Scalar, y: Scalar) -> tuple[Scalar, Scalar]:
+    """Cosine and sine of the azimuth of `(x, y)`; (1, 0) at the origin, where there is none."""
+    square = x * x + y * y
+    scale = 1 / jnp.sqrt(jnp.where(square > 0, square, 1))
+    return jnp.where(square > 0, x * scale, 1), y * scale
+
+
+# Taylor coefficients of sin and cos: on |x| <= pi/4 the first term left out is below half an ulp.
+_SIN = [(-1) ** k / math.factorial(2 * k + 1) for k in range(9)]
+_COS = [(-1) ** k / math.factorial(2 * k) for k in range(9)]
+
+
+def _horner(coefficients, x):
+    value = coefficients[-1]
+    for c in reversed(coefficients[:-1]):
+        value = value * x + c
+    return value
+
+
+def cos_sin_turn(u: Scalar) -> tuple[Scalar, Scalar]:
+    r"""$(\cos 2\pi u, \sin 2\pi u)$ for `u` in [0, 1].
+
+    `u` is reduced to an eighth of a turn exactly, before the rounding of $\pi$ can enter; the polynomial that is left
+    costs a fraction of the library's functions, which must reduce any argument.
+    """
+    u = jnp.asarray(u)
+    terms = 9 if u.dtype == jnp.float64 else 6
+    quarter = jnp.round(4 * u)
+    x = (2 * math.pi) * (u - quarter / 4)
+    square = x * x
+    c, s = _horner(_COS[:terms], square), x * _horner(_SIN[:terms], square)
+    swap = (quarter == 1) | (quarter == 3)
+    c, s = jnp.where(swap, s, c), jnp.where(swap, c, s)
+    negate_cos, negate_sin = (quarter == 1) | (quarter == 2), (quarter == 2) | (quarter == 3)
+    return jnp.where(negate_cos, -c, c), jnp.where(negate_sin, -s, s)
+
+
+# Chebyshev coefficients in t = (a - 3) / (a + 3) of sqrt(pi) (1 + 2 a^2) exp(a^2) ierfc(a), a smooth function that is
+# 1 at both ends of [0, inf). tests/test_stable.py computes them again with arb.
+_IERFC = (
+    0.8983020427745623,
+    0.11262785225761364,
+    0.03571305852948175,
+    -0.08726578763158488,
+    0.059453479214879104,
+    -0.02438560091618397,
+    0.006522770600882268,
+    -0.001005650624929731,
+    1.2794620962747412e-05,
+    2.978488482221082e-05,
+    -4.347826728577626e-06,
+    -6.093356111432701e-07,
+    2.10743212981155e-07,
+    1.1652759571892747e-08,
+    -9.038074775178108e-09,
+    -3.030761419449976e-10,
+    3.982604818145382e-10,
+    1.7577574077580366e-11,
+    -1.8236389678792617e-11,
+    -1.5040092030317944e-12,
+    8.316356698523843e-13,
+    1.2574718318109538e-13,
+    -3.4581066655988014e-14,
+    -9.476313500734717e-15,
+    1.0395855246885352e-15,
+    6.309879635822399e-16,
+    8.575482470432927e-18,
+    -3.562663873637638e-17,
+    -4.9147812293757106e-18,
+    1.4988660813585e-18,
+)
+
+
+@jax.custom_jvp
+def ierfc(a: Scalar) -> Scalar:
+    r"""First repeated integral of erfc, $\int_a^\infty \mathrm{erfc} = e^{-a^2}/\sqrt\pi - a\,\mathrm{erfc}(a)$, for `a >= 0`.
+
+    This is the shape of every Gaussian projected area: Beckmann's Λ is `ierfc(a) / (2 a)`. The two terms agree in all
+    but $1/2a^2$ of themselves, hence a Chebyshev series (after Shepherd & Laframboise 1981) times the exponential.
+    """
+    a = jnp.asarray(a)
+    coefficients = _IERFC if a.dtype == jnp.float64 else _IERFC[:16]
+    t = (a - 3) / (a + 3)
+    b, b_next = jnp.zeros_like(t), jnp.zeros_like(t)
+    for c in reversed(coefficients[1:]):  # Clenshaw
+        b, b_next = c + 2 * t * b - b_next, b
+    return (coefficients[0] + t * b - b_next) * jnp.exp(-a * a) / (math.sqrt(math.pi) * (1 + 2 * a * a))
+
+
+@ierfc.defjvp
+def _ierfc_jvp(primals, tangents):
+    (a,), (da,) = primals, tangents
+    return ierfc(a), -jax.scipy.special.erfc(a) * da
+
+
+def _x_minus_sin(x):
+    """x − sin x for 0 <= x <= pi, without the cancellation at 0."""
+    square = x * x
+    # x^3/3! - x^5/5! + ...: where it is used (x < 1.5), 13 terms reach the last bit of float64.
+    series = _horner([(-1) ** k / math.factorial(2 * k + 3) for k in range(13)], square)
+    return jnp.where(x < 1.5, x * square * series, x - jnp.sin(x))
+
+
+@jax.custom_jvp
+def kepler(v: Scalar) -> Scalar:
+    r"""The root E in [0, π] of $E - \sin E = 2\pi v$ for `v` in [0, 1/2]: Kepler's equation at eccentricity 1.
+
+    E/2 is the angle that cuts the fraction `v` of a disk's area, so this inverts the marginal of a uniform disk.
+    """
+    v = jnp.asarray(v)
+    target = (2 * math.pi) * v
+    # E ~ (6 target)^(1/3) for small targets, and within 16 % of the root everywhere: Halley's third step is exact.
+    E = jnp.cbrt(6 * target)
+    for _ in range(4):
+        # Divide by E^3 (f ~ E^3/6): for the smallest v the cube itself would underflow.
+        f = _x_minus_sin(E) - target
+        slope = 2 * jnp.sin(E / 2) ** 2
+        step = f / jnp.where(slope > 0, slope, 1)
+        curvature = jnp.sin(E) / jnp.where(slope > 0, slope, 1)
+        E = E - step / (1 - 0.5 * step * curvature)
+    return E
+
+
+@kepler.defjvp
+def _kepler_jvp(primals, tangents):
+    (v,), (dv,) = primals, tangents
+    E = kepler(v)
+    slope = 2 * jnp.sin(E / 2) ** 2
+    return E, jnp.where(slope > 0, (2 * math.pi) / jnp.where(slope > 0, slope, 1), 0) * dv
