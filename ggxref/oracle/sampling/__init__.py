@@ -1,0 +1,1 @@
+"""The samplers and their densities in arbitrary precision, one method a file."""
