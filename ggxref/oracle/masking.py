@@ -6,13 +6,13 @@ from ggxref.oracle.linalg import Matrix, N, Vector, apply, dot, norm, normalise
 from ggxref.oracle.precision import at_least_zero, sign
 
 
-def _sigma_ggx(w: Vector, alpha: Vector) -> arb:
+def sigma_ggx(w: Vector, alpha: Vector) -> arb:
     """int max(w.m, 0) D dm = (z + |(ax x, ay y, z)|) / 2 for a unit w: dupuy2023 (4), unstretched."""
     (x, y, z), (ax, ay) = w, alpha
     return (z + norm((ax * x, ay * y, z))) / 2
 
 
-def _sigma_beckmann(w: Vector, alpha: Vector) -> arb:
+def sigma_beckmann(w: Vector, alpha: Vector) -> arb:
     """int max(w.m, 0) D dm for a unit w, also below the horizon.
 
     z (1 + erf a) / 2 + s exp(-a^2) / (2 sqrt pi), s = |(ax x, ay y)|, a = z / s: the integral of max(0, z - s t)
@@ -65,7 +65,7 @@ def g1_ggx(w: Vector, wm: Vector, alpha: Vector) -> arb:
     if not _front(w, wm):
         return arb(0)
     w = _raised(w)
-    return w[2] / _sigma_ggx(w, alpha)
+    return w[2] / sigma_ggx(w, alpha)
 
 
 def g1_beckmann(w: Vector, wm: Vector, alpha: Vector) -> arb:
@@ -73,7 +73,7 @@ def g1_beckmann(w: Vector, wm: Vector, alpha: Vector) -> arb:
     if not _front(w, wm):
         return arb(0)
     w = _raised(w)
-    return w[2] / _sigma_beckmann(w, alpha)
+    return w[2] / sigma_beckmann(w, alpha)
 
 
 def g1_v_cavity(w: Vector, wm: Vector) -> arb:
