@@ -31,7 +31,8 @@ def lambda_beckmann(w: Vec3, alpha: Vec2) -> Scalar:
 
 def _front(w, wm):
     """χ⁺ of eq. (3) of heitz2014: is this side of the microfacet turned to `w`, seen from w's side of the surface?"""
-    return stable.dot(w, wm) * w[2] > 0
+    cosine = stable.dot(w, wm)
+    return ((cosine > 0) & (w[2] > 0)) | ((cosine < 0) & (w[2] < 0))  # a product could underflow
 
 
 def _up(w):

@@ -73,11 +73,11 @@ def unit(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     return x * scale, y * scale, z * scale
 
 
-def azimuth(x: Scalar, y: Scalar) -> tuple[Scalar, Scalar]:
-    """Cosine and sine of the azimuth of `(x, y)`; (1, 0) at the origin, where there is none."""
+def azimuth(x: Scalar, y: Scalar, pole: tuple[float, float] = (1, 0)) -> tuple[Scalar, Scalar]:
+    """Cosine and sine of the azimuth of `(x, y)`; `pole` at the origin, where there is none."""
     square = x * x + y * y
     scale = 1 / jnp.sqrt(jnp.where(square > 0, square, 1))
-    return jnp.where(square > 0, x * scale, 1), y * scale
+    return jnp.where(square > 0, x * scale, pole[0]), jnp.where(square > 0, y * scale, pole[1])
 
 
 # Taylor coefficients of sin and cos: on |x| <= pi/4 the first term left out is below half an ulp.
@@ -146,6 +146,16 @@ _IERFC = (
 )
 
 
+def _ierfc_scaled(a):
+    """exp(a²) ierfc(a) for a >= 0."""
+    coefficients = _IERFC if a.dtype == jnp.float64 else _IERFC[:16]
+    t = (a - 3) / (a + 3)
+    b, b_next = jnp.zeros_like(t), jnp.zeros_like(t)
+    for c in reversed(coefficients[1:]):  # Clenshaw
+        b, b_next = c + 2 * t * b - b_next, b
+    return (coefficients[0] + t * b - b_next) / (math.sqrt(math.pi) * (1 + 2 * a * a))
+
+
 @jax.custom_jvp
 def ierfc(a: Scalar) -> Scalar:
     r"""First repeated integral of erfc, $\int_a^\infty \mathrm{erfc} = e^{-a^2}/\sqrt\pi - a\,\mathrm{erfc}(a)$, for `a >= 0`.
@@ -154,18 +164,21 @@ def ierfc(a: Scalar) -> Scalar:
     but $1/2a^2$ of themselves, hence a Chebyshev series (after Shepherd & Laframboise 1981) times the exponential.
     """
     a = jnp.asarray(a)
-    coefficients = _IERFC if a.dtype == jnp.float64 else _IERFC[:16]
-    t = (a - 3) / (a + 3)
-    b, b_next = jnp.zeros_like(t), jnp.zeros_like(t)
-    for c in reversed(coefficients[1:]):  # Clenshaw
-        b, b_next = c + 2 * t * b - b_next, b
-    return (coefficients[0] + t * b - b_next) * jnp.exp(-a * a) / (math.sqrt(math.pi) * (1 + 2 * a * a))
+    return _ierfc_scaled(a) * jnp.exp(-a * a)
 
 
 @ierfc.defjvp
 def _ierfc_jvp(primals, tangents):
     (a,), (da,) = primals, tangents
     return ierfc(a), -jax.scipy.special.erfc(a) * da
+
+
+def gaussian_tails(a: Scalar) -> tuple[Scalar, Scalar]:
+    """`exp(a²) erfc(a)` and `exp(a²) ierfc(a)` for `a >= 0`: the tails without their underflow."""
+    scaled = _ierfc_scaled(a)
+    small = a < 0.5
+    direct = jnp.exp(jnp.where(small, a * a, 0)) * jax.scipy.special.erfc(jnp.where(small, a, 0))
+    return jnp.where(small, direct, (1 / math.sqrt(math.pi) - scaled) / jnp.where(small, 1, a)), scaled
 
 
 def _x_minus_sin(x):
@@ -187,12 +200,11 @@ def kepler(v: Scalar) -> Scalar:
     # E ~ (6 target)^(1/3) for small targets, and within 16 % of the root everywhere: Halley's third step is exact.
     E = jnp.cbrt(6 * target)
     for _ in range(4):
-        # Divide by E^3 (f ~ E^3/6): for the smallest v the cube itself would underflow.
         f = _x_minus_sin(E) - target
         slope = 2 * jnp.sin(E / 2) ** 2
-        step = f / jnp.where(slope > 0, slope, 1)
-        curvature = jnp.sin(E) / jnp.where(slope > 0, slope, 1)
-        E = E - step / (1 - 0.5 * step * curvature)
+        slope = jnp.where(slope > 0, slope, 1)
+        step = f / slope
+        E = E - step / (1 - 0.5 * step * (jnp.sin(E) / slope))
     return E
 
 

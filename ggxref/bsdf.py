@@ -1,0 +1,57 @@
+"""D, G and F put together: BRDF, BTDF [1/sr] and the weights of the samplers, from their values."""
+
+import jax.numpy as jnp
+
+from ggxref import geometry, jacobian, stable
+from ggxref._types import Scalar, Vec3
+
+
+def _over(numerator, denominator):
+    """The quotient, and 0 where the denominator is 0: a direction in the surface, or one that is wholly masked."""
+    safe = jnp.where(denominator == 0, 1, denominator)
+    return jnp.where(denominator == 0, 0, numerator / safe)
+
+
+def brdf(wi: Vec3, wo: Vec3, D: Scalar, G2: Scalar, F: Scalar) -> Scalar:
+    r"""$f_r = D\,G_2\,F / (4\,|\omega_i\cdot n||\omega_o\cdot n|)$ [1/sr]; 0 where either lies in the horizon.
+
+    - `wi`, `wo`: unit, (3,), on the same side. `D`, `G2`, `F`: values at their half vector (`geometry.half_reflection`).
+
+    heitz2014 §2.1 (which prints D(ω_ht)); walter2014 (4); dupuy2023 (11).
+    """
+    return _over(D * G2 * F, 4 * jnp.abs(wi[2]) * jnp.abs(wo[2]))
+
+
+def btdf(wi: Vec3, wo: Vec3, n_i: Scalar, n_o: Scalar, D: Scalar, G2: Scalar, F: Scalar) -> Scalar:
+    r"""$f_t = \frac{|\omega_i\cdot\omega_h||\omega_o\cdot\omega_h|}{|\omega_i\cdot n||\omega_o\cdot n|}
+    \frac{n_o^2 (1-F) G_2 D}{(n_i\,\omega_i\cdot\omega_h + n_o\,\omega_o\cdot\omega_h)^2}$ [1/sr].
+
+    - `wi`, `wo`: unit, (3,), on opposite sides; `n_i`, `n_o > 0`: indices of refraction on their sides.
+    - `D`, `G2`, `F`: values at their half vector (`geometry.half_refraction`); F is the reflectance.
+    - Infinite where `n_i = n_o` and `wo = -wi`; 0 where either direction lies in the horizon.
+
+    heitz2014 §2.1.
+    """
+    wm = geometry.half_refraction(wi, wo, n_i, n_o)
+    transmitted = jnp.abs(stable.dot(wi, wm)) * jacobian.refraction(wi, wo, wm, n_i, n_o) * (1 - F) * G2 * D
+    return _over(transmitted, jnp.abs(wi[2]) * jnp.abs(wo[2]))
+
+
+def weight_normals(wi: Vec3, wm: Vec3, G2: Scalar) -> Scalar:
+    r"""Weight of a sample from $D(\omega_m\cdot n)$: $|\omega_i\cdot\omega_m| G_2 / (|\omega_i\cdot n||\omega_m\cdot n|)$; F is in the choice.
+
+    - `wi`, `wm`: unit, (3,). In [0, 2] for V-cavities, in [0, ∞[ for Smith's G2.
+
+    heitz2014 §2.2, algorithm 1 (table 2 leaves out |ω_i·n|).
+    """
+    return _over(jnp.abs(stable.dot(wi, wm)) * G2, jnp.abs(wi[2]) * jnp.abs(wm[2]))
+
+
+def weight_visible(g1_i: Scalar, g2: Scalar, F: Scalar) -> Scalar:
+    r"""Weight of a sample from the visible normals: $F\,G_2/G_1(\omega_i)$ in [0, 1]; 0 where $G_1 = 0$.
+
+    - `F`: 1 where reflection and transmission are chosen by Fresnel's term, F where only reflection is followed.
+
+    heitz2014 algorithm 2 (F = 1); walter2014 (50)–(52); dupuy2023 (19), (20).
+    """
+    return _over(F * g2, g1_i)

@@ -1,0 +1,61 @@
+"""Visible GGX normals from a smaller cap: it leaves out reflections that end below the horizon (tokuyoshi2024)."""
+
+import jax.numpy as jnp
+
+from ggxref import ndf, stable
+from ggxref._types import Scalar, Vec2, Vec3
+from ggxref.ellipsoid import length
+from ggxref.sampling._sphere import half_in_cap, incident, unstretch
+
+
+def _bound_terms(wi, alpha):
+    """k and 1 − k, each without cancellation."""
+    a = jnp.minimum(jnp.minimum(alpha[0], alpha[1]), 1)
+    s = 1 + length(wi[0], wi[1], 0)
+    denominator = s * s + (a * wi[2]) ** 2
+    above = wi[2] > 0
+    k = jnp.where(above, (1 - a) * (1 + a) * s * s / denominator, 1)
+    return k, jnp.where(above, a * a * (s * s + wi[2] ** 2) / denominator, 0)
+
+
+def bound(wi: Vec3, alpha: Vec2) -> Scalar:
+    r"""$k = (1-a^2)s^2/(s^2 + a^2z_i^2)$, $a = \min(\alpha_x, \alpha_y, 1)$, $s = 1 + \|(x_i, y_i)\|$: the cap ends at $-k z_i'$.
+
+    - `wi`: unit, (3,). 1, no bound, where it is not above the horizon.
+    - `alpha`: positive, (2,).
+
+    tokuyoshi2024.
+    """
+    return _bound_terms(wi, alpha)[0]
+
+
+def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
+    r"""As `spherical_cap.sample` with the cap $\{z > -k z_i'\}$: only for single reflection.
+
+    - `u`: in [0, 1)², (2,). `wi`: unit, (3,), anywhere but straight below. `alpha`: positive, (2,).
+    - Returns a micronormal with density `pdf`: unit, (3,), above the horizon.
+
+    tokuyoshi2024.
+    """
+    i = incident(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
+    return unstretch(*half_in_cap(u, i, _bound_terms(wi, alpha)[1] * i.z), alpha)
+
+
+def pdf(wm: Vec3, wi: Vec3, alpha: Vec2) -> Scalar:
+    r"""$2 D(\omega_m)\max(0, \omega_i\cdot\omega_m)/(k z_i + \|(\alpha_x x_i, \alpha_y y_i, z_i)\|)$ [1/sr], 0 outside the cap.
+
+    - `wm`, `wi`: unit, (3,). `alpha`: positive, (2,).
+    - The article's formula is its value on the cap; every `wm` that reflects `wi` above the horizon lies there. The edge
+      is widened by a few ulps, so that no generated sample gets density 0.
+
+    tokuyoshi2024.
+    """
+    cosine = stable.dot(wi, wm)
+    i = incident(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
+    cut = _bound_terms(wi, alpha)[1]
+    # o'_z + i'_z = 2 (ωi·ωm) z_m / (norm q) has to reach (1 − k) z_i / norm.
+    q = (wm[0] / alpha[0]) ** 2 + (wm[1] / alpha[1]) ** 2 + wm[2] ** 2
+    slack = 1 - 16 * float(jnp.finfo(wm.dtype).eps)
+    inside = (cosine > 0) & (2 * cosine * wm[2] >= slack * cut * wi[2] * q)
+    area = i.norm * (i.rise - cut * i.z)
+    return jnp.where(inside, 2 * ndf.ggx(wm, alpha) * cosine / jnp.where(inside, area, 1), 0)

@@ -1,0 +1,79 @@
+r"""Visible normals of the ellipsoid NDF from a smaller cap, as tokuyoshi2024 does for GGX, with a bound that is proved.
+
+With `A` canonical, `m` the unit micronormal and `o` its reflection, $o_z' + i_z' = (i_z + o_z)/(\|A i\|\,\|A^{-T}m\|^2)$. The
+micronormals that reflect `i` above the horizon have an inclination of at most $\theta_1 = (\theta_i + 90°)/2$, and at
+inclination θ $\|A^{-T}m\|^2 \le Q(\theta) = \cos^2\theta + (\sin\theta + \|e\|\cos\theta)^2/c^2$, `c` the smaller singular value of `C`. So
+$o_z' + i_z' \ge i_z/(\|A i\| \max_{\theta\le\theta_1} Q)$. At e = 0 and α ≤ 1 this is tokuyoshi2024's bound.
+"""
+
+import jax.numpy as jnp
+
+from ggxref import ndf, stable
+from ggxref._types import Mat3, Scalar, Vec2, Vec3
+from ggxref.ellipsoid import canonical, cofactor, length, times
+from ggxref.sampling._sphere import half_in_cap
+from ggxref.sampling.ellipsoid_cap import from_sphere, to_sphere
+
+
+def _largest_q(wi, canonical_A):
+    """Maximum of Q over [0, θ₁]: Q is a sinusoid of 2θ with one maximum in [0°, 90°]."""
+    (c00, c10, _), (_, c11, _), (ex, ey, _) = canonical_A
+    sigma_max = (length(c00 + c11, c10, 0) + length(c00 - c11, c10, 0)) / 2
+    c_square = (c00 * c11 / sigma_max) ** 2
+    skew = length(ex, ey, 0)
+    # Q = mean + b cos 2θ + a sin 2θ.
+    a = skew / c_square
+    b = (1 + (skew - 1) * (skew + 1) / c_square) / 2
+    mean = (1 + (1 + skew * skew) / c_square) / 2
+    amplitude = length(a, b, 0)
+    # cos 2θ₁ = −sin θi; cos²θ₁ = (1 − sin θi)/2.
+    sin_i = length(wi[0], wi[1], 0)
+    cos_square, sin_square = wi[2] ** 2 / (2 * (1 + sin_i)), (1 + sin_i) / 2
+    at_end = cos_square + (stable.sqrt(sin_square) + skew * stable.sqrt(cos_square)) ** 2 / c_square
+    return jnp.where(b >= -amplitude * sin_i, mean + amplitude, at_end)
+
+
+def _cut(wi, i, canonical_A):
+    return jnp.where(wi[2] > 0, wi[2] / (i.norm * _largest_q(wi, canonical_A)), 0)
+
+
+def bound(wi: Vec3, A: Mat3) -> Scalar:
+    r"""Lower end of the cap in sphere space: $i_z/(\|A\omega_i\|\max Q) - i_z'$; $-i_z'$ where `wi` is not above the horizon.
+
+    - `wi`: unit, (3,). `A`: shape matrix, (3, 3), non-singular.
+    """
+    A = canonical(A)
+    i = to_sphere(wi, A)
+    return _cut(wi, i, A) - i.z
+
+
+def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:
+    """As `ellipsoid_cap.sample` with the cap's lower end at `bound`: only for single reflection.
+
+    - `u`: in [0, 1)², (2,). `wi`: unit, (3,), anywhere but where A ω_i points straight below.
+    - `A`: shape matrix, (3, 3), non-singular. Returns a micronormal with density `pdf`: unit, (3,), above the horizon.
+    """
+    A = canonical(A)
+    i = to_sphere(wi, A)
+    return from_sphere(*half_in_cap(u, i, _cut(wi, i, A)), A)
+
+
+def pdf(wm: Vec3, wi: Vec3, A: Mat3) -> Scalar:
+    r"""$2 D(\omega_m)\max(0, \omega_i\cdot\omega_m)/(\|A\omega_i\|(1 - L))$, `L` the `bound` [1/sr]; 0 outside the cap.
+
+    - `wm`, `wi`: unit, (3,). `A`: shape matrix, (3, 3), non-singular.
+    - The edge is widened by a few ulps, so that no generated sample gets density 0.
+
+    tokuyoshi2024's p_bound, for the ellipsoid.
+    """
+    A = canonical(A)
+    i = to_sphere(wi, A)
+    cosine = stable.dot(wi, wm)
+    cof, det = cofactor(A)
+    x, y, z = times(cof, *wm)
+    q = (x / det) ** 2 + (y / det) ** 2 + (z / det) ** 2
+    cut = _cut(wi, i, A)
+    slack = 1 - 64 * float(jnp.finfo(wm.dtype).eps)
+    inside = (cosine > 0) & (2 * cosine * wm[2] >= slack * cut * i.norm * q)
+    area = i.norm * (i.rise - cut)
+    return jnp.where(inside, 2 * ndf.ellipsoid(wm, A) * cosine / jnp.where(inside, area, 1), 0)

@@ -1,0 +1,126 @@
+"""Visible normals of the ellipsoid NDF through the silhouette of a lune: walter2014 §4, versions 1 to 3."""
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int
+
+from ggxref import stable
+from ggxref._types import Mat3, Scalar, Vec2, Vec3
+from ggxref.ellipsoid import cofactor, length, times
+from ggxref.geometry import basis
+from ggxref.sampling._sphere import Incident, crescent
+from ggxref.sampling._visible import pdf_ellipsoid as pdf
+
+__all__ = ["pdf", "sample", "sample_rejection_ellipsoid", "sample_rejection_sphere"]
+
+
+def _concentric(u: Vec2) -> tuple[Scalar, Scalar, Scalar]:
+    """Point of the unit disk and its `1 - r²`: walter2014 (34)–(37) (Shirley & Chiu 1997)."""
+    a, b = 2 * u[0] - 1, 2 * u[1] - 1
+    wide = jnp.abs(a) > jnp.abs(b)
+    r, other = jnp.where(wide, a, b), jnp.where(wide, b, a)
+    c, s = stable.cos_sin_turn(other / (8 * jnp.where(r == 0, 1, r)))
+    edge = 2 * jnp.minimum(jnp.minimum(u[0], 1 - u[0]), jnp.minimum(u[1], 1 - u[1]))  # 1 - |r|
+    return r * jnp.where(wide, c, s), r * jnp.where(wide, s, c), edge * (2 - edge)
+
+
+def _frame(wi, A):
+    """(42)–(44) and the lune's angle: e1, e2, e3 as rows, `A wi` in the coordinates of A n's pole, and its sine."""
+    a, n = times(A, *wi), times(A, 0, 0, 1)
+    norm_a, norm_n = length(*a), length(*n)
+    cross = times(cofactor(A)[0], wi[1], -wi[0], 0)  # Aψ × An, also where det A < 0
+    sin_product = length(*cross)
+    e3 = jnp.stack(a) / norm_a
+    collinear = sin_product == 0
+    free = basis(e3)
+    e2 = jnp.where(collinear, free[1], jnp.stack(cross) / jnp.where(collinear, 1, sin_product))
+    e1 = jnp.where(collinear, free[0], jnp.cross(e2, e3))
+    product = norm_a * norm_n
+    cosine = a[0] * n[0] + a[1] * n[1] + a[2] * n[2]
+    sin_theta = sin_product / product
+    large = product + jnp.abs(cosine)
+    small = sin_product / large * sin_product
+    below = cosine < 0
+    rise, fall = jnp.where(below, small, large) / product, jnp.where(below, large, small) / product
+    pole = Incident(sin_theta, jnp.zeros_like(sin_theta), cosine / product, norm_a, rise, fall)
+    return jnp.stack([e1, e2, e3]), pole, norm_n
+
+
+def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:
+    """Draw a point of the disk, compress it to the lune's crescent, lift it to the sphere, map it to the ellipsoid.
+
+    - `u`: in [0, 1)², (2,). `wi`: unit, (3,), anywhere but where A ω_i points along -A n.
+    - `A`: shape matrix, (3, 3), non-singular, of either sign.
+    - Returns a micronormal with density `pdf`: unit, (3,), above the horizon.
+
+    walter2014 (34)–(46), version 3. Where ω_i = n, (43) leaves e₂ free: it is the second row of `geometry.basis(e3)`.
+    """
+    along, across, rim = _concentric(u)
+    (e1, e2, e3), pole, norm_n = _frame(wi, A)
+    moved, lifted, height = crescent(along, rim, pole, pole.x)
+    x, y, _ = times(A.T, *(moved * e1 + across * e2 + lifted * e3))
+    # The third component is p·An: `height` has its sign right where the sum would round below the horizon.
+    return jnp.stack(stable.unit(x, y, norm_n * height))
+
+
+Tries = Float[Array, "n 2"]
+
+
+def _first(accepted, wm):
+    """The first accepted row and its number from 1; the zero vector and 0 where there is none."""
+    row = jnp.argmax(accepted)
+    found = accepted[row]
+    return jnp.where(found, wm[row], 0), jnp.where(found, row + 1, 0)
+
+
+def _disk(u):
+    cos_phi, sin_phi = stable.cos_sin_turn(u[0])
+    r = stable.sqrt(u[1])
+    return r * cos_phi, r * sin_phi
+
+
+def sample_rejection_ellipsoid(u: Tries, wi: Vec3, A: Mat3) -> tuple[Vec3, Int[Array, ""]]:
+    """Version 2: points of the ellipsoid's own silhouette until one lies on the lune.
+
+    - `u`: in [0, 1), (n, 2), a row a try. `wi`, `A`: as `sample`.
+    - Returns the first accepted micronormal, unit, (3,), and the number of tries that it took; the zero vector and 0
+      where all n fail. Not differentiable in the choice of the row.
+
+    walter2014 §4, version 2. Disk point: `r = sqrt(u[1])`, turned by `u[0]` in the frame `geometry.basis(A wi)`.
+    """
+    e3 = jnp.stack(stable.unit(*times(A, *wi)))
+    t, b, _ = basis(e3)
+
+    def attempt(u):
+        x, y = _disk(u)
+        m = jnp.stack(stable.unit(*times(A.T, *(x * t + y * b + stable.sqrt(1 - u[1]) * e3))))
+        return m[2] > 0, m
+
+    return _first(*jax.vmap(attempt)(u))
+
+
+def sample_rejection_sphere(u: Tries, wi: Vec3, A: Mat3) -> tuple[Vec3, Int[Array, ""]]:
+    """Version 1: rays through the silhouette of the bounding sphere until one meets the lune.
+
+    - As `sample_rejection_ellipsoid`; the frame is `geometry.basis(wi)` and the sphere's radius is the ellipsoid's
+      longest half axis.
+
+    walter2014 §4, version 1.
+    """
+    wide = A.astype(jnp.promote_types(A.dtype, jnp.float32))  # no half-precision singular values
+    radius = 1 / jnp.linalg.svd(wide, compute_uv=False)[-1].astype(A.dtype)
+    t, b, _ = basis(wi)
+    a = times(A, *wi)
+    a_square = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+
+    def attempt(u):
+        x, y = _disk(u)
+        q = times(A, *(radius * (x * t + y * b)))
+        projection = a[0] * q[0] + a[1] * q[1] + a[2] * q[2]
+        miss = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] - 1
+        discriminant = projection * projection - a_square * miss
+        along = (stable.sqrt(discriminant) - projection) / a_square
+        m = jnp.stack(stable.unit(*times(A.T, q[0] + along * a[0], q[1] + along * a[1], q[2] + along * a[2])))
+        return (discriminant >= 0) & (m[2] > 0), m
+
+    return _first(*jax.vmap(attempt)(u))

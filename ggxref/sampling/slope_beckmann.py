@@ -1,0 +1,130 @@
+"""Visible Beckmann normals through their slopes: heitz2014 algorithm 4, both distribution functions inverted to full precision."""
+
+import math
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+from jax.scipy.special import erfc
+
+from ggxref import stable
+from ggxref._types import Scalar, Vec2, Vec3
+from ggxref.sampling._sphere import incident, unstretch
+from ggxref.sampling._visible import pdf_beckmann as pdf
+
+__all__ = ["pdf", "sample"]
+
+_DENSITY = 2 / math.sqrt(math.pi)
+
+
+def _survival(a, s, c):
+    r"""$\frac{2}{\sqrt\pi}\int_a^\infty (s a' + c) e^{-a'^2} da'$ for a >= 0: its logarithm, and the density over it."""
+    tail, tail_integral = stable.gaussian_tails(a)
+    height = s * a + c
+    scaled = jnp.maximum(s * tail_integral + height * tail, jnp.finfo(a.dtype).tiny)
+    return jnp.log(scaled) - a * a, _DENSITY * height / scaled
+
+
+def _below(a, s, c, edge_area):
+    """The same integral from the edge −c/s up to a <= 0: its logarithm, and the density over it."""
+    tail, tail_integral = stable.gaussian_tails(-a)
+    height = s * a + c
+    value = (height * tail - s * tail_integral) * jnp.exp(-a * a) + edge_area
+    value = jnp.maximum(value, jnp.finfo(a.dtype).tiny)
+    return jnp.log(value), _DENSITY * height * jnp.exp(-a * a) / value
+
+
+def _root(residual: Callable, lower, upper, start):
+    """Zero of an increasing function given with its slope: Newton's steps, halving the bracket where one leaves it."""
+    x = start
+    for _ in range(14 if start.dtype == jnp.float64 else 10):
+        value, slope = residual(x)
+        lower, upper = jnp.where(value < 0, x, lower), jnp.where(value > 0, x, upper)
+        new = x - value / jnp.where(slope > 0, slope, 1)
+        inside = (slope > 0) & (new >= lower) & (new <= upper)
+        x = jnp.where(inside, new, (lower + upper) / 2)
+    return x
+
+
+@jax.custom_jvp
+def _quantile(u: Scalar, s: Scalar, c: Scalar) -> Scalar:
+    r"""The `a` above which lies the share `u` of the density $\propto \max(0, s a + c) e^{-a^2}$, for `u > 0`: (11) with $a = -\tilde x$.
+
+    The integral is taken from the nearer end, and its logarithm matched: both ends are log-concave, where Newton's
+    steps converge from afar.
+    """
+    tiny = jnp.finfo(s.dtype).tiny
+    s = jnp.maximum(s, tiny)
+    edge = jnp.minimum(c / s, 1 / math.sqrt(tiny))
+    floor = jnp.maximum(-edge, 0)  # where the density starts, if it starts above 0
+    edge_tail, edge_integral = stable.gaussian_tails(jnp.abs(edge))
+    edge_area = s * edge_integral * jnp.exp(-edge * edge)
+    # Below the horizon the whole density is this one tail; the logarithm outlives its underflow.
+    log_total = jnp.where(
+        c > 0,
+        jnp.log(2 * jnp.maximum(c, 0) + edge_area),
+        jnp.log(s * edge_integral) - edge * edge,
+    )
+
+    u = jnp.maximum(u, tiny)
+    w = jnp.minimum(u, 1 - u)  # the nearer share
+    log_target = jnp.log(w) + log_total
+    reach = jnp.sqrt(-jnp.log(w))
+
+    def above(a):
+        value, ratio = _survival(a, s, c)
+        return log_target - value, ratio
+
+    def below(a):
+        # For a > 0 it is the rest of the survival, of which it is then at least a tenth.
+        lower, lower_ratio = _below(jnp.minimum(a, 0), s, c, edge_area)
+        survival, ratio = _survival(jnp.maximum(a, 0), s, c)
+        part = -jnp.expm1(jnp.minimum(survival - log_total, -tiny))
+        part = jnp.maximum(part, tiny)
+        upper, upper_ratio = log_total + jnp.log(part), ratio * jnp.exp(survival - log_total) / part
+        return jnp.where(a > 0, upper, lower) - log_target, jnp.where(a > 0, upper_ratio, lower_ratio)
+
+    near_top = _root(above, jnp.broadcast_to(floor, w.shape), floor + reach, floor + reach)
+    bottom = jnp.maximum(-edge, -reach)
+    spread = 1 / (1 + floor)  # the median lies within twice this of the floor
+    near_edge = _root(below, bottom, floor + 2 * spread, (bottom + floor) / 2 + spread / 2)
+    return jnp.where(u <= 0.5, near_top, near_edge)
+
+
+@_quantile.defjvp
+def _quantile_jvp(primals, tangents):
+    """By the implicit function theorem on survival(a; s, c) = u · total(s, c)."""
+    (u, s, c), (du, ds, dc) = primals, tangents
+    a = _quantile(u, s, c)
+    edge = c / jnp.where(s > 0, s, 1)
+    root_pi = math.sqrt(math.pi)
+    at_edge_s = jnp.where(s > 0, jnp.exp(-edge * edge) / root_pi, 0)
+    at_edge_c = jnp.where(s > 0, erfc(-edge), 2)
+    total = s * at_edge_s + c * at_edge_c
+    density = _DENSITY * (s * a + c) * jnp.exp(-a * a)
+    change = (jnp.exp(-a * a) / root_pi - u * at_edge_s) * ds + (erfc(a) - u * at_edge_c) * dc - total * du
+    return a, jnp.where(density > 0, change / jnp.where(density > 0, density, 1), 0)
+
+
+def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
+    r"""Draw the slope along `wi` from its marginal, the slope across from its conditional; rotate and unstretch.
+
+    In the stretched frame with $\omega_i = (\sin\theta, 0, \cos\theta)$ the slope along has the density
+    $\propto \max(0, \cos\theta - \tilde x\sin\theta)\,e^{-\tilde x^2}$, increasing from $-\infty$ with `u[0]`; the slope across is
+    $\mathrm{erf}^{-1}(2u_1 - 1)$, the same law at θ = 0.
+
+    - `u`: in [0, 1)², (2,). `wi`: unit, (3,), anywhere but straight below. `alpha`: positive, (2,).
+    - Returns a micronormal with density `pdf`: unit, (3,), above the horizon; in the horizon where a number is 0, whose
+      slope is infinite (both 0: midway between the two).
+
+    heitz2014 (10)–(13), algorithm 4.
+    """
+    i = incident(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
+    along = _quantile(u[0], stable.sqrt(i.x * i.x + i.y * i.y), i.z)
+    across = _quantile(u[1], jnp.zeros_like(i.z), jnp.ones_like(i.z))
+    horizontal = (u[0] == 0) | (u[1] == 0)
+    x = jnp.where(horizontal, (u[0] == 0).astype(along.dtype), along)
+    y = jnp.where(horizontal, (u[1] == 0).astype(along.dtype), across)
+    cos_i, sin_i = stable.azimuth(i.x, i.y)
+    # `along` and `across` are the negated slopes, which are the normal's own components.
+    return unstretch(cos_i * x - sin_i * y, sin_i * x + cos_i * y, jnp.where(horizontal, 0, 1).astype(x.dtype), alpha)
