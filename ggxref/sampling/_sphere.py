@@ -67,8 +67,8 @@ def crescent(along: Scalar, rim: Scalar, i: Incident, sin_theta: Scalar) -> tupl
     lifted = stable.sqrt(s * below_rim * (half_chord * i.fall + s * above_rim))
     # z = lifted i.z + moved sin_theta; where the terms differ in sign, times its conjugate.
     plus, minus = lifted * i.z, moved * sin_theta
-    differ = (plus > 0) != (minus > 0)
-    conjugate = jnp.where(differ & (plus != minus), plus - minus, 1)
+    differ = ((plus > 0) & (minus < 0)) | ((plus < 0) & (minus > 0))
+    conjugate = jnp.where(differ, plus - minus, 1)
     z = jnp.where(differ, s * above_rim * (half_chord * i.z - moved) / conjugate, plus + minus)
     return moved, lifted, z
 

@@ -31,8 +31,8 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
     sin_psi = sine * i.z - cosine * sin_theta
     # cos ψ = cosine cos θ + sine sin θ; where the terms differ in sign, times its conjugate.
     plus, minus = cosine * i.z, sine * sin_theta
-    differ = (plus > 0) != (minus > 0)
-    conjugate = jnp.where(differ & (plus != minus), plus - minus, 1)
+    differ = ((plus > 0) & (minus < 0)) | ((plus < 0) & (minus > 0))
+    conjugate = jnp.where(differ, plus - minus, 1)
     cos_psi = jnp.where(differ, lower * (2 * i.z - lower) / conjugate, plus + minus)
 
     upper = u[1] > 0.5
