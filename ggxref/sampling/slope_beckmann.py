@@ -71,7 +71,7 @@ def _quantile(u: Scalar, s: Scalar, c: Scalar) -> Scalar:
     s = jnp.maximum(s, tiny)
     edge = jnp.minimum(c / s, 1 / math.sqrt(tiny))
     floor = jnp.maximum(-edge, 0)  # where the density starts, if it starts above 0
-    edge_tail, edge_integral = stable.gaussian_tails(jnp.abs(edge))
+    _, edge_integral = stable.gaussian_tails(jnp.abs(edge))
     edge_area = s * edge_integral * jnp.exp(-edge * edge)
     # Below the horizon the whole density is this one tail; the logarithm outlives its underflow.
     log_total = jnp.where(
