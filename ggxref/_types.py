@@ -3,7 +3,8 @@
 from jax import Array
 from jaxtyping import Float
 
-Scalar = Float[Array, ""] | float | int
+Scalar = Float[Array, ""]
+Real = Scalar | float | int  # an argument that may be a plain number
 Vec2 = Float[Array, "2"]
 Vec3 = Float[Array, "3"]
 Mat2 = Float[Array, "2 2"]

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 
 from ggxref import geometry, jacobian, stable
-from ggxref._types import Scalar, Vec3
+from ggxref._types import Real, Scalar, Vec3
 
 
 def _over(numerator, denominator):
@@ -12,7 +12,7 @@ def _over(numerator, denominator):
     return jnp.where(denominator == 0, 0, numerator / safe)
 
 
-def brdf(wi: Vec3, wo: Vec3, D: Scalar, G2: Scalar, F: Scalar) -> Scalar:
+def brdf(wi: Vec3, wo: Vec3, D: Real, G2: Real, F: Real) -> Scalar:
     r"""$f_r = D\,G_2\,F / (4\,|\omega_i\cdot n||\omega_o\cdot n|)$ [1/sr]; 0 where either lies in the horizon.
 
     - `wi`, `wo`: unit, (3,), on the same side. `D`, `G2`, `F`: values at their half vector (`geometry.half_reflection`).
@@ -22,7 +22,7 @@ def brdf(wi: Vec3, wo: Vec3, D: Scalar, G2: Scalar, F: Scalar) -> Scalar:
     return _over(D * G2 * F, 4 * jnp.abs(wi[2]) * jnp.abs(wo[2]))
 
 
-def btdf(wi: Vec3, wo: Vec3, n_i: Scalar, n_o: Scalar, D: Scalar, G2: Scalar, F: Scalar) -> Scalar:
+def btdf(wi: Vec3, wo: Vec3, n_i: Real, n_o: Real, D: Real, G2: Real, F: Real) -> Scalar:
     r"""$f_t = \frac{|\omega_i\cdot\omega_h||\omega_o\cdot\omega_h|}{|\omega_i\cdot n||\omega_o\cdot n|}
     \frac{n_o^2 (1-F) G_2 D}{(n_i\,\omega_i\cdot\omega_h + n_o\,\omega_o\cdot\omega_h)^2}$ [1/sr].
 
@@ -37,7 +37,7 @@ def btdf(wi: Vec3, wo: Vec3, n_i: Scalar, n_o: Scalar, D: Scalar, G2: Scalar, F:
     return _over(transmitted, jnp.abs(wi[2]) * jnp.abs(wo[2]))
 
 
-def weight_normals(wi: Vec3, wm: Vec3, G2: Scalar) -> Scalar:
+def weight_normals(wi: Vec3, wm: Vec3, G2: Real) -> Scalar:
     r"""Weight of a sample from $D(\omega_m\cdot n)$: $|\omega_i\cdot\omega_m| G_2 / (|\omega_i\cdot n||\omega_m\cdot n|)$; F is in the choice.
 
     - `wi`, `wm`: unit, (3,). In [0, 2] for V-cavities, in [0, ∞[ for Smith's G2.
@@ -47,7 +47,7 @@ def weight_normals(wi: Vec3, wm: Vec3, G2: Scalar) -> Scalar:
     return _over(jnp.abs(stable.dot(wi, wm)) * G2, jnp.abs(wi[2]) * jnp.abs(wm[2]))
 
 
-def weight_visible(g1_i: Scalar, g2: Scalar, F: Scalar) -> Scalar:
+def weight_visible(g1_i: Real, g2: Real, F: Real) -> Scalar:
     r"""Weight of a sample from the visible normals: $F\,G_2/G_1(\omega_i)$ in [0, 1]; 0 where $G_1 = 0$.
 
     - `F`: 1 where reflection and transmission are chosen by Fresnel's term, F where only reflection is followed.

@@ -9,7 +9,7 @@ import math
 import jax.numpy as jnp
 
 from ggxref import stable
-from ggxref._types import Mat2, Mat3, Scalar, Vec2, Vec3
+from ggxref._types import Mat2, Mat3, Real, Scalar, Vec2, Vec3
 
 
 def times(A: Mat3, x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
@@ -101,7 +101,7 @@ def size(A: Mat3) -> Scalar:
     return jnp.sqrt(jnp.abs(cofactor(A)[1]) / (math.pi * length(*A[:, 2])))
 
 
-def gaussian_curvature(wm: Vec3, A: Mat3, size: Scalar) -> Scalar:
+def gaussian_curvature(wm: Vec3, A: Mat3, size: Real) -> Scalar:
     r"""Gaussian curvature where the normal is `wm`: $K = |A|^2 \|A^{-T}\omega_m\|^4 / C_e^2$.
 
     - `wm`: unit, (3,), anywhere on the sphere.
@@ -114,7 +114,7 @@ def gaussian_curvature(wm: Vec3, A: Mat3, size: Scalar) -> Scalar:
     return ((x * x + y * y + z * z) / det / size) ** 2
 
 
-def projected_area(w: Vec3, A: Mat3, size: Scalar) -> Scalar:
+def projected_area(w: Vec3, A: Mat3, size: Real) -> Scalar:
     r"""Area of the ellipsoid's shadow along `w`: $\pi C_e^2 \|A\omega\| / |A|$.
 
     - `w`: unit, (3,), anywhere on the sphere.
@@ -140,7 +140,7 @@ def lune_sum(u: Vec3, v: Vec3, A: Mat3) -> Scalar:
     return jnp.where(obtuse, square / jnp.where(obtuse, product - cosine, 1), product + cosine)
 
 
-def lune_area(u: Vec3, v: Vec3, A: Mat3, size: Scalar) -> Scalar:
+def lune_area(u: Vec3, v: Vec3, A: Mat3, size: Real) -> Scalar:
     r"""Area projected along `u` of the part with $m\cdot u > 0$ and $m\cdot v > 0$:
     $\pi C_e^2 (\|Au\|\|Av\| + Au\cdot Av) / (2 |A| \|Av\|)$.
 

@@ -7,10 +7,10 @@ indices alone.
 import jax.numpy as jnp
 
 from ggxref import stable
-from ggxref._types import Scalar
+from ggxref._types import Real, Scalar
 
 
-def dielectric(cos_i: Scalar, eta: Scalar) -> Scalar:
+def dielectric(cos_i: Real, eta: Real) -> Scalar:
     r"""$F = (R_s^2 + R_p^2)/2$, $R_s = \frac{\eta c - c_t}{\eta c + c_t}$, $R_p = \frac{c - \eta c_t}{c + \eta c_t}$,
     $c_t = \sqrt{1 - \eta^2(1 - c^2)}$; 1 in total reflection, 0 at `eta = 1`.
 
@@ -32,7 +32,7 @@ def dielectric(cos_i: Scalar, eta: Scalar) -> Scalar:
     return jnp.where(total & (gap < 0), 1, jnp.where(fine, (r_s * r_s + r_p * r_p) / 2, 0))
 
 
-def conductor(cos_i: Scalar, eta: Scalar, k: Scalar) -> Scalar:
+def conductor(cos_i: Real, eta: Real, k: Real) -> Scalar:
     r"""$F$ for the complex index $\eta + ik = n_o/n_i$ of the metal, relative to the side that the light is on.
 
     This is the η of the tables of metals, the inverse of `dielectric`'s: `conductor(c, n, 0) = dielectric(c, 1/n)`.
@@ -57,7 +57,7 @@ def conductor(cos_i: Scalar, eta: Scalar, k: Scalar) -> Scalar:
     return s * (1 + p) / 2
 
 
-def schlick(cos_i: Scalar, f0: Scalar) -> Scalar:
+def schlick(cos_i: Real, f0: Real) -> Scalar:
     r"""Schlick's approximation: $F = F_0 + (1 - F_0)(1 - |c|)^5$.
 
     - `cos_i` in [-1, 1]; `f0` in [0, 1], the reflectance at normal incidence.

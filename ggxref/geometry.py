@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 
 from ggxref import stable
-from ggxref._types import Mat3, Scalar, Vec3
+from ggxref._types import Mat3, Real, Vec3
 
 
 def reflect(w: Vec3, wm: Vec3) -> Vec3:
@@ -16,7 +16,7 @@ def reflect(w: Vec3, wm: Vec3) -> Vec3:
     return 2 * stable.dot(w, wm) * wm - w
 
 
-def refract(w: Vec3, wm: Vec3, eta: Scalar) -> Vec3:
+def refract(w: Vec3, wm: Vec3, eta: Real) -> Vec3:
     r"""Direction transmitted through a microfacet:
     $\omega_o = (\eta c - \mathrm{sgn}(c)\sqrt{1 + \eta^2 (c^2 - 1)})\,\omega_m - \eta\,\omega$, $c = \omega \cdot \omega_m$.
 
@@ -44,7 +44,7 @@ def half_reflection(wi: Vec3, wo: Vec3) -> Vec3:
     return jnp.stack(stable.unit(*(wi + wo)))
 
 
-def half_refraction(wi: Vec3, wo: Vec3, n_i: Scalar, n_o: Scalar) -> Vec3:
+def half_refraction(wi: Vec3, wo: Vec3, n_i: Real, n_o: Real) -> Vec3:
     r"""The micronormal that refracts `wi` to `wo`, on the upper side:
     $\omega_h = \pm (n_i \omega_i + n_o \omega_o)/\|n_i \omega_i + n_o \omega_o\|$ with $\omega_h \cdot n \ge 0$.
 

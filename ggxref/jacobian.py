@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 
 from ggxref import stable
-from ggxref._types import Mat3, Scalar, Vec3
+from ggxref._types import Mat3, Real, Scalar, Vec3
 
 
 def reflection(wo: Vec3, wm: Vec3) -> Scalar:
@@ -16,7 +16,7 @@ def reflection(wo: Vec3, wm: Vec3) -> Scalar:
     return 1 / (4 * jnp.abs(stable.dot(wo, wm)))
 
 
-def refraction(wi: Vec3, wo: Vec3, wm: Vec3, n_i: Scalar, n_o: Scalar) -> Scalar:
+def refraction(wi: Vec3, wo: Vec3, wm: Vec3, n_i: Real, n_o: Real) -> Scalar:
     r"""$\|\partial\omega_h/\partial\omega_o\| = n_o^2|\omega_o\cdot\omega_m| / (n_i\,\omega_i\cdot\omega_m + n_o\,\omega_o\cdot\omega_m)^2$.
 
     - `wi`, `wo`, `wm`: unit, (3,); `n_i`, `n_o > 0`. Infinite where `wo = -wi` and `n_i = n_o`.

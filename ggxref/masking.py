@@ -9,7 +9,7 @@ other side (walter2014 (7)), as transmission needs. All directions are unit, (3,
 import jax.numpy as jnp
 
 from ggxref import stable
-from ggxref._types import Mat3, Scalar, Vec2, Vec3
+from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import sigma as sigma_ellipsoid
 from ggxref.slopes import gaussian_area, sigma_beckmann, sigma_ggx
 
@@ -85,12 +85,12 @@ def g1_ellipsoid(w: Vec3, wm: Vec3, A: Mat3) -> Scalar:
     return jnp.where(_front(w, wm), g1, 0)
 
 
-def g2_separable(g1_i: Scalar, g1_o: Scalar) -> Scalar:
+def g2_separable(g1_i: Real, g1_o: Real) -> Scalar:
     r"""Masking and shadowing independent: $G_2 = G_1(\omega_i)\,G_1(\omega_o)$. heitz2014 §2.1, walter2014 (5)."""
     return g1_i * g1_o
 
 
-def g2_height_correlated(g1_i: Scalar, g1_o: Scalar) -> Scalar:
+def g2_height_correlated(g1_i: Real, g1_o: Real) -> Scalar:
     r"""Smith's G2 with correlated heights: $G_iG_o/(G_i + G_o - G_iG_o)$, for reflection; 0 where both are 0.
 
     dupuy2023 (13).

@@ -8,7 +8,7 @@ import math
 
 import jax.numpy as jnp
 
-from ggxref._types import Mat3, Scalar, Vec2, Vec3
+from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import cofactor, length, times
 
 
@@ -45,7 +45,7 @@ def beckmann(wm: Vec3, alpha: Vec2) -> Scalar:
     return jnp.where(seen, D, 0)
 
 
-def student_t(wm: Vec3, alpha: Vec2, gamma: Scalar) -> Scalar:
+def student_t(wm: Vec3, alpha: Vec2, gamma: Real) -> Scalar:
     r"""Student-t slopes: $D = \frac{(\gamma-1)^\gamma}{\pi\alpha_x\alpha_y z^4 (\gamma - 1 + (x^2/\alpha_x^2 + y^2/\alpha_y^2)/z^2)^\gamma}$.
 
     - `gamma > 1`: 2 is GGX, infinity Beckmann; below 2, D has no bound towards the horizon.

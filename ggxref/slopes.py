@@ -10,7 +10,7 @@ import math
 import jax.numpy as jnp
 
 from ggxref import stable
-from ggxref._types import Mat3, Scalar, Vec2, Vec3
+from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import canonical
 
 
@@ -49,7 +49,7 @@ def beckmann(slope: Vec2, alpha: Vec2) -> Scalar:
     return jnp.exp(-_stretched_square(slope, alpha)) / (math.pi * alpha[0] * alpha[1])
 
 
-def student_t(slope: Vec2, alpha: Vec2, gamma: Scalar) -> Scalar:
+def student_t(slope: Vec2, alpha: Vec2, gamma: Real) -> Scalar:
     r"""$P^{22} = (\gamma-1)^\gamma / (\pi\alpha_x\alpha_y (\gamma-1+\tilde x^2/\alpha_x^2+\tilde y^2/\alpha_y^2)^\gamma)$.
 
     - `gamma > 1`: 2 is GGX, infinity Beckmann.
