@@ -12,7 +12,7 @@ from ggxref import stable
 from ggxref._types import Mat2, Mat3, Real, Scalar, Vec2, Vec3
 
 
-def times(A: Mat3, x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+def times(A: Mat3, x: Real, y: Real, z: Real) -> tuple[Scalar, Scalar, Scalar]:
     """`A (x, y, z)` written out: XLA fuses it, and no accelerator computes it in fewer bits than were given."""
     (a, b, c), (d, e, f), (g, h, i) = A
     return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
@@ -25,7 +25,7 @@ def cofactor(A: Mat3) -> tuple[Mat3, Scalar]:
     return rows, a[0] * rows[0, 0] + a[1] * rows[0, 1] + a[2] * rows[0, 2]
 
 
-def length(x: Scalar, y: Scalar, z: Scalar) -> Scalar:
+def length(x: Real, y: Real, z: Real) -> Scalar:
     """Euclidean norm of a vector in components; its gradient at the zero vector is 0."""
     return stable.sqrt(x * x + y * y + z * z)
 

@@ -87,7 +87,7 @@ def g1_ellipsoid(w: Vec3, wm: Vec3, A: Mat3) -> Scalar:
 
 def g2_separable(g1_i: Real, g1_o: Real) -> Scalar:
     r"""Masking and shadowing independent: $G_2 = G_1(\omega_i)\,G_1(\omega_o)$. heitz2014 §2.1, walter2014 (5)."""
-    return g1_i * g1_o
+    return jnp.asarray(g1_i) * g1_o
 
 
 def g2_height_correlated(g1_i: Real, g1_o: Real) -> Scalar:

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from ggxref._types import Scalar, Vec3
+from ggxref._types import Real, Scalar, Vec3
 
 # Bits of the significand that the high half keeps, so that a product of two halves is exact.
 _HIGH = {jnp.dtype("float32"): (jnp.uint32, 0xFFFFF000), jnp.dtype("float64"): (jnp.uint64, 0xFFFFFFFFF8000000)}
@@ -60,7 +60,7 @@ def _dot_jvp(primals, tangents):
     return dot(a, b), (da[0] * b[0] + da[1] * b[1] + da[2] * b[2]) + (a[0] * db[0] + a[1] * db[1] + a[2] * db[2])
 
 
-def sqrt(x: Scalar) -> Scalar:
+def sqrt(x: Real) -> Scalar:
     """Square root with derivative 0, not infinity, at `x <= 0`; 0 for negative `x`, which only rounding may make."""
     # The inner `where` stops the NaN that `0 * inf` would put in the gradient.
     return jnp.where(x > 0, jnp.sqrt(jnp.where(x > 0, x, 1)), 0)
@@ -92,7 +92,7 @@ def _horner(coefficients, x):
     return value
 
 
-def cos_sin_turn(u: Scalar) -> tuple[Scalar, Scalar]:
+def cos_sin_turn(u: Real) -> tuple[Scalar, Scalar]:
     r"""$(\cos 2\pi u, \sin 2\pi u)$ for `u` in [0, 1].
 
     `u` is reduced to an eighth of a turn exactly, before the rounding of $\pi$ can enter; the polynomial that is left
@@ -157,7 +157,7 @@ def _ierfc_scaled(a):
 
 
 @jax.custom_jvp
-def ierfc(a: Scalar) -> Scalar:
+def ierfc(a: Real) -> Scalar:
     r"""First repeated integral of erfc, $\int_a^\infty \mathrm{erfc} = e^{-a^2}/\sqrt\pi - a\,\mathrm{erfc}(a)$, for `a >= 0`.
 
     This is the shape of every Gaussian projected area: Beckmann's Λ is `ierfc(a) / (2 a)`. The two terms agree in all
@@ -173,7 +173,7 @@ def _ierfc_jvp(primals, tangents):
     return ierfc(a), -jax.scipy.special.erfc(a) * da
 
 
-def gaussian_tails(a: Scalar) -> tuple[Scalar, Scalar]:
+def gaussian_tails(a: Real) -> tuple[Scalar, Scalar]:
     """`exp(a²) erfc(a)` and `exp(a²) ierfc(a)` for `a >= 0`: the tails without their underflow."""
     scaled = _ierfc_scaled(a)
     small = a < 0.5
@@ -190,7 +190,7 @@ def _x_minus_sin(x):
 
 
 @jax.custom_jvp
-def kepler(v: Scalar) -> Scalar:
+def kepler(v: Real) -> Scalar:
     r"""The root E in [0, π] of $E - \sin E = 2\pi v$ for `v` in [0, 1/2]: Kepler's equation at eccentricity 1.
 
     E/2 is the angle that cuts the fraction `v` of a disk's area, so this inverts the marginal of a uniform disk.

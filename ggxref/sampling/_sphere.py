@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from ggxref import stable
-from ggxref._types import Scalar, Vec2, Vec3
+from ggxref._types import Real, Scalar, Vec2, Vec3
 
 
 class Incident(NamedTuple):
@@ -32,7 +32,7 @@ def incident(x: Scalar, y: Scalar, z: Scalar) -> Incident:
     return Incident(x / norm, y / norm, z / norm, norm, rise, fall)
 
 
-def half_in_cap(u: Vec2, i: Incident, cut: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+def half_in_cap(u: Vec2, i: Incident, cut: Real) -> tuple[Scalar, Scalar, Scalar]:
     """`i + c` (not normalised) with `c` uniform on the cap `{z > cut - i.z}`.
 
     `cut = 0` is the whole cap of the reflections of the hemisphere (dupuy2023 listing 3); tokuyoshi2024's is
