@@ -4,10 +4,24 @@ import signal
 import sys
 
 import typer
+from typer.core import TyperGroup
 
 from ggxref.errors import InputError
 
+
+class _Verbs(TyperGroup):
+    """The verbs, with bad input turned into one line and exit code 2."""
+
+    def invoke(self, ctx: typer.Context):
+        try:
+            return super().invoke(ctx)
+        except InputError as error:
+            print(f"ggxref: {error}", file=sys.stderr)
+            raise typer.Exit(2) from None
+
+
 app = typer.Typer(
+    cls=_Verbs,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -27,10 +41,5 @@ def _interrupted(signum: int, frame: object) -> None:
 
 
 def main() -> None:
-    """Run the command line: exit code 2 and one line for bad input, 130 for Ctrl-C."""
-    signal.signal(signal.SIGINT, _interrupted)
-    try:
-        app()
-    except InputError as error:
-        print(f"ggxref: {error}", file=sys.stderr)
-        raise SystemExit(2) from None
+    signal.signal(signal.SIGINT, _interrupted)  # before the libraries, whose own answer to Ctrl-C is a traceback
+    app()
