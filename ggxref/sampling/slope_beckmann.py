@@ -35,8 +35,10 @@ def _below(a, s, c, edge_area):
     return jnp.log(value), _DENSITY * height * jnp.exp(-a * a) / value
 
 
-# Gauss–Legendre on [0, 1]: exact to the last bit for the smooth integrand below.
-_NODES, _WEIGHTS = (0.5 + 0.5 * np.polynomial.legendre.leggauss(10)[0], 0.5 * np.polynomial.legendre.leggauss(10)[1])
+# Gauss–Legendre on [0, 1]: exact to the last bit for the smooth integrand below. Python numbers: NumPy's would make
+# float64 of float32.
+_X, _W = np.polynomial.legendre.leggauss(10)
+_NODES, _WEIGHTS = (0.5 + 0.5 * _X).tolist(), (0.5 * _W).tolist()
 
 
 def _near_edge(a, s, edge):
@@ -50,14 +52,17 @@ def _near_edge(a, s, edge):
 
 def _root(residual: Callable, lower, upper, start):
     """Zero of an increasing function given with its slope: Newton's steps, halving the bracket where one leaves it."""
-    x = start
-    for _ in range(14 if start.dtype == jnp.float64 else 10):
+
+    def step(_, state):
+        x, lower, upper = state
         value, slope = residual(x)
         lower, upper = jnp.where(value < 0, x, lower), jnp.where(value > 0, x, upper)
         new = x - value / jnp.where(slope > 0, slope, 1)
         inside = (slope > 0) & (new >= lower) & (new <= upper)
-        x = jnp.where(inside, new, (lower + upper) / 2)
-    return x
+        return jnp.where(inside, new, (lower + upper) / 2), lower, upper
+
+    # A loop, not unrolled: the steps of the two roots of two slopes would take the compiler half a minute.
+    return jax.lax.fori_loop(0, 14 if start.dtype == jnp.float64 else 10, step, (start, lower, upper))[0]
 
 
 @jax.custom_jvp
@@ -140,8 +145,10 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
     heitz2014 (10)–(13), algorithm 4.
     """
     i = incident(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
-    along = _quantile(u[0], stable.sqrt(i.x * i.x + i.y * i.y), i.z)
-    across = _quantile(u[1], jnp.zeros_like(i.z), jnp.ones_like(i.z))
+    # Both slopes by one call: the second is the same law at θ = 0.
+    sin = jnp.stack([stable.sqrt(i.x * i.x + i.y * i.y), jnp.zeros_like(i.z)])
+    cos = jnp.stack([i.z, jnp.ones_like(i.z)])
+    along, across = jax.vmap(_quantile)(u, sin, cos)
     horizontal = (u[0] == 0) | (u[1] == 0)
     x = jnp.where(horizontal, (u[0] == 0).astype(along.dtype), along)
     y = jnp.where(horizontal, (u[1] == 0).astype(along.dtype), across)
