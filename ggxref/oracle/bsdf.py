@@ -3,7 +3,7 @@
 from flint import arb
 
 from ggxref.oracle.geometry import half_refraction
-from ggxref.oracle.linalg import Vector, dot, normalise
+from ggxref.oracle.linalg import Vector, cosine, normalise
 from ggxref.oracle.precision import sign
 
 
@@ -24,17 +24,15 @@ def btdf(wi: Vector, wo: Vector, n_i: arb, n_o: arb, D: arb, G2: arb, F: arb) ->
     h = half_refraction(wi, wo, n_i, n_o)
     if all(part == 0 for part in h):
         return arb.pos_inf()
-    wi, wo = normalise(wi), normalise(wo)
-    ih, oh = dot(wi, h), dot(wo, h)
-    return abs(ih) * abs(oh) * n_o**2 * (1 - F) * G2 * D / (abs(wi[2]) * abs(wo[2]) * (n_i * ih + n_o * oh) ** 2)
+    ih, oh, z_i, z_o = cosine(wi, h), cosine(wo, h), normalise(wi)[2], normalise(wo)[2]
+    return abs(ih) * abs(oh) * n_o**2 * (1 - F) * G2 * D / (abs(z_i) * abs(z_o) * (n_i * ih + n_o * oh) ** 2)
 
 
 def weight_normals(wi: Vector, wm: Vector, G2: arb) -> arb:
     """|i.m| G2 / (|z_i| |z_m|), 0 on the horizon. heitz2014 algorithm 1."""
     if sign(wi[2]) * sign(wm[2]) == 0:
         return arb(0)
-    wi, wm = normalise(wi), normalise(wm)
-    return abs(dot(wi, wm)) * G2 / (abs(wi[2]) * abs(wm[2]))
+    return abs(cosine(wi, wm)) * G2 / (abs(normalise(wi)[2]) * abs(normalise(wm)[2]))
 
 
 def weight_visible(g1_i: arb, g2: arb, F: arb) -> arb:

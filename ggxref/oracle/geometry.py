@@ -21,16 +21,16 @@ def reflect(w: Vector, wm: Vector) -> Vec3:
 def refract(w: Vector, wm: Vector, eta: arb) -> Vec3:
     """(eta c - sgn(c) sqrt(1 + eta^2 (c^2 - 1))) m - eta w, c = w.m; the zero vector in total reflection.
 
-    heitz2014 section 2.2, with the eta^2 that it misses under the root, and the side of m (w.m, not w.n). sgn(0) = -1.
+    heitz2014 section 2.2, with the eta^2 that it misses under the root, and the side of m (w.m, not w.n). sgn(0) = -1. The
+    factor of m is 0 at eta = 1, and known to be.
     """
     c = dot(w, wm)
     with exactly():
         squares = dot(w, w) * dot(wm, wm)
-        radicand = squares + eta * eta * (c * c - squares)
+        radicand, eta_c = squares + eta * eta * (c * c - squares), eta * c
     if sign(radicand) < 0:
         return ZERO, ZERO, ZERO
-    cosine, cos_t = c / squares.sqrt(), (radicand / squares).sqrt()
-    along = eta * cosine - cos_t if sign(c) > 0 else eta * cosine + cos_t
+    along = surds(eta_c, ONE, -ONE if sign(c) > 0 else ONE, radicand) / squares.sqrt()
     return add(scale(along, normalise(wm)), scale(-eta, normalise(w)))
 
 

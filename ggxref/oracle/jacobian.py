@@ -2,22 +2,26 @@
 
 from flint import arb
 
-from ggxref.oracle.linalg import Matrix, Vector, apply, determinant, dot, norm, normalise
-from ggxref.oracle.precision import sign
+from ggxref.oracle.linalg import Matrix, Vector, apply, cosine, determinant, dot, norm, normalise, surds
+from ggxref.oracle.precision import exactly, sign
 
 
 def reflection(wo: Vector, wm: Vector) -> arb:
     """d wm / d wo = 1 / (4 |wo.m|), infinite where they are perpendicular. dupuy2023 (8)."""
-    c = dot(wo, wm)
-    if sign(c) == 0:
+    if sign(dot(wo, wm)) == 0:
         return arb.pos_inf()
-    return norm(wo) * norm(wm) / (4 * abs(c))
+    return 1 / (4 * abs(cosine(wo, wm)))
 
 
 def refraction(wi: Vector, wo: Vector, wm: Vector, n_i: arb, n_o: arb) -> arb:
-    """d wm / d wo = n_o^2 |wo.m| / (n_i wi.m + n_o wo.m)^2. heitz2014 section 2.2."""
-    wi, wo, wm = normalise(wi), normalise(wo), normalise(wm)
-    return n_o**2 * abs(dot(wo, wm)) / (n_i * dot(wi, wm) + n_o * dot(wo, wm)) ** 2
+    """d wm / d wo = n_o^2 |wo.m| / (n_i wi.m + n_o wo.m)^2, infinite where the sum is 0. heitz2014 section 2.2."""
+    im, om = dot(wi, wm), dot(wo, wm)
+    with exactly():
+        weighted = n_i * im, dot(wo, wo), n_o * om, dot(wi, wi)
+    total = surds(*weighted) / (norm(wi) * norm(wo) * norm(wm))
+    if total == 0:
+        return arb.pos_inf()
+    return n_o**2 * abs(cosine(wo, wm)) / total**2
 
 
 def slope(wm: Vector) -> arb:

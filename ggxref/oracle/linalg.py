@@ -33,6 +33,16 @@ def norm(a: Vector) -> arb:
     return root(dot(a, a))
 
 
+def cosine(a: Vector, b: Vector) -> arb:
+    """a . b / (|a| |b|), 0 if they are perpendicular."""
+    return dot(a, b) / (norm(a) * norm(b))
+
+
+def square(x: arb) -> arb:
+    """x^2. The operator makes a NaN of a ball about 0."""
+    return x * x
+
+
 def scale(c: arb, a: Vector) -> Vec3:
     """c a."""
     x, y, z = a

@@ -3,7 +3,7 @@
 from flint import arb
 
 from ggxref.oracle.linalg import Matrix, N, Vector, apply, dot, norm, normalise
-from ggxref.oracle.precision import at_least_zero, sign
+from ggxref.oracle.precision import at_least_zero, exactly, sign
 
 
 def sigma_ggx(w: Vector, alpha: Vector) -> arb:
@@ -77,11 +77,12 @@ def g1_beckmann(w: Vector, wm: Vector, alpha: Vector) -> arb:
 
 
 def g1_v_cavity(w: Vector, wm: Vector) -> arb:
-    """chi+((w.m)/(w.n)) min(1, 2 |m.n| |w.n| / |w.m|). heitz2014 (3)."""
+    """chi+((w.m)/(w.n)) min(1, 2 |m.n| |w.n| / |w.m|). heitz2014 (3). The lengths of w and m cancel."""
     if not _front(w, wm):
         return arb(0)
-    w, wm = normalise(w), normalise(wm)
-    return (2 * abs(wm[2]) * abs(w[2]) / abs(dot(w, wm))).min(arb(1))
+    with exactly():
+        ratio = 2 * abs(wm[2] * w[2]), abs(dot(w, wm))
+    return (ratio[0] / ratio[1]).min(arb(1))
 
 
 def g1_ellipsoid(w: Vector, wm: Vector, A: Matrix) -> arb:

@@ -3,7 +3,7 @@
 from flint import arb
 
 from ggxref.oracle import ndf
-from ggxref.oracle.linalg import ONE, Vec3, Vector, apply, dot, norm, normalise
+from ggxref.oracle.linalg import ONE, Vec3, Vector, apply, cosine, dot, norm, normalise
 from ggxref.oracle.precision import exactly, sign
 from ggxref.oracle.sampling import sphere
 
@@ -31,7 +31,8 @@ def _in_cap(wm: Vector, wi: Vector, alpha: Vector) -> bool:
     """o_z' + k i_z' >= 0 for a facing m.
 
     That is 2 (i.m) z_m >= (1 - k) z_i |B^-T m|^2, with 1 - k = a^2 (s^2 + z_i^2) / (s^2 + a^2 z_i^2). Multiplied out, it
-    is a polynomial of exact numbers wherever |wi| and |(x_i, y_i)| are rational, as at normal incidence.
+    is a polynomial of exact numbers wherever |wi| and |(x_i, y_i)| are rational, as at normal incidence; and where a = 1,
+    s drops out.
     """
     if sign(wi[2]) <= 0:
         return True
@@ -39,13 +40,14 @@ def _in_cap(wm: Vector, wi: Vector, alpha: Vector) -> bool:
     s, i = norm(wi) + norm((wi[0], wi[1], arb(0))), wi[2]
     with exactly():
         stretched = (x * ay) ** 2 + (y * ax) ** 2 + (z * ax * ay) ** 2
-        seen = 2 * c * z * (ax * ay) ** 2 * (s * s + (a * i) ** 2)
-        return sign(seen - a * a * (s * s + i * i) * i * stretched) >= 0
+        seen, least = 2 * c * z * (ax * ay) ** 2, i * stretched
+        return sign((seen - a * a * least) * s * s + a * a * (seen - least) * i * i) >= 0
 
 
 def pdf(wm: Vector, wi: Vector, alpha: Vector) -> arb:
     """2 D max(0, wi.m) / (k z_i + |(ax x_i, ay y_i, z_i)|) [1/sr], 0 where m reflects wi out of the cap. p_bound."""
     if not sphere.front(wm, wi) or not _in_cap(wm, wi, alpha):
         return arb(0)
-    i, m = normalise(wi), normalise(wm)
-    return 2 * ndf.ggx(m, alpha) * dot(i, m) / (bound(wi, alpha) * i[2] + norm(apply(sphere.stretch(alpha), i)))
+    i = normalise(wi)
+    area = bound(wi, alpha) * i[2] + norm(apply(sphere.stretch(alpha), i))
+    return 2 * ndf.ggx(wm, alpha) * cosine(wi, wm) / area

@@ -3,7 +3,7 @@
 from flint import arb
 
 from ggxref.oracle import masking, ndf
-from ggxref.oracle.linalg import ONE, ZERO, Vec3, Vector, add, cross, dot, normalise, scale
+from ggxref.oracle.linalg import ONE, ZERO, Vec3, Vector, add, cosine, cross, normalise, scale
 from ggxref.oracle.precision import root
 from ggxref.oracle.sampling import sphere
 
@@ -31,5 +31,4 @@ def pdf(wm: Vector, wi: Vector, alpha: Vector) -> arb:
     """max(0, wi.m) D(m) / sigma(wi) [1/sr]. heitz2014 (5)."""
     if not sphere.front(wm, wi):
         return arb(0)
-    i, m = normalise(wi), normalise(wm)
-    return dot(i, m) * ndf.ggx(m, alpha) / masking.sigma_ggx(i, alpha)
+    return cosine(wi, wm) * ndf.ggx(wm, alpha) / masking.sigma_ggx(normalise(wi), alpha)

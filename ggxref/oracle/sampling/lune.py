@@ -15,14 +15,17 @@ from ggxref.oracle.linalg import (
     Vector,
     add,
     apply,
+    cosine,
     cross,
     determinant,
     dot,
+    norm,
     normalise,
     scale,
+    square,
     transpose,
 )
-from ggxref.oracle.precision import root, sign
+from ggxref.oracle.precision import exactly, root, sign
 from ggxref.oracle.sampling import sphere
 
 
@@ -41,22 +44,24 @@ def _concentric(u: Vector) -> tuple[arb, arb]:
 def sample(u: Vector, wi: Vector, A: Matrix) -> Vec3:
     """Version 3: the disk compressed to the crescent, lifted to the sphere, mapped to the ellipsoid. walter2014 (34)-(46).
 
-    Where wi = n, e1 and e2 are the first two rows of `geometry.basis(e3)`.
+    Where wi = n, e1 and e2 are the first two rows of `geometry.basis(e3)`. A^T is applied before the axes are normalised:
+    a component that it takes to 0 is then known to be 0.
     """
     xa, ya = _concentric(u)
-    Ai, An = apply(A, wi), apply(A, N)
-    e3, across = normalise(Ai), cross(Ai, An)
-    if all(part == 0 for part in across):
-        e1, e2, _ = basis(e3)
-        s = ONE if sign(dot(Ai, An)) > 0 else ZERO
+    e3, An = apply(A, wi), apply(A, N)
+    if wi[0] == 0 and wi[1] == 0:
+        s, (e1, e2, e3) = ONE, basis(sphere.incident(wi, A))
     else:
-        e2 = normalise(across)
+        s = (1 + cosine(e3, An)) / 2
+        e2 = cross(e3, An)
         e1 = cross(e2, e3)
-        s = (1 + dot(e3, normalise(An))) / 2
-    xb = s * xa + (1 - s) * root(1 - ya**2)
-    zb = root(1 - xb**2 - ya**2)
-    p = add(scale(xb, e1), scale(ya, e2), scale(zb, e3))
-    return normalise(apply(transpose(A), p))
+    rim = 0 in u
+    xb = s * xa + (1 - s) * (abs(xa) if rim else root(1 - square(ya)))
+    # The rim's far half stays the sphere's silhouette; its near half becomes the lune's edge, where m is horizontal.
+    zb = ZERO if rim and xa > 0 else root(1 - square(xb) - square(ya))
+    axes = zip((xb, ya, zb), (e1, e2, e3), strict=True)
+    x, y, z = add(*(scale(part / norm(e), apply(transpose(A), e)) for part, e in axes))
+    return normalise((x, y, ZERO if rim and xa <= 0 else z))
 
 
 def pdf(wm: Vector, wi: Vector, A: Matrix) -> arb:
@@ -77,33 +82,34 @@ def sample_rejection_ellipsoid(u: Sequence[Vector], wi: Vector, A: Matrix) -> tu
 
     The disk's axes are the first two rows of `geometry.basis(A wi)`. (zero vector, 0) where every row fails.
     """
-    t, b, e3 = basis(apply(A, wi))
+    Ai = apply(A, wi)
+    t, b, _ = basis(Ai)
+    across, up, along = (apply(transpose(A), axis) for axis in (t, b, Ai))
     for tries, row in enumerate(u, start=1):
         x, y = _disk(row)
-        p = add(scale(x, t), scale(y, b), scale((1 - row[1]).sqrt(), e3))
-        m = apply(transpose(A), p)
+        m = add(scale(x, across), scale(y, up), scale((1 - row[1]).sqrt() / norm(Ai), along))
         if sign(m[2]) > 0:
             return normalise(m), arb(tries)
     return (ZERO, ZERO, ZERO), ZERO
 
 
 def _longest_half_axis(A: Matrix) -> arb:
-    """1 / the smallest singular value of A: the square root of the largest eigenvalue of (A^T A)^-1, in closed form."""
+    """1 / the smallest singular value of A: the square root of the largest eigenvalue of (A^T A)^-1, in closed form.
+
+    With K = 3 S - tr(S) I for the adjugate S of A^T A, and p^2 = |K|^2 / 6 (Frobenius), that of S is
+    (tr S + 2 p cos(angle / 3)) / 3, cos(angle) = det K / (2 p^3). K is exact, so that eigenvalues which agree do so exactly.
+    """
     (a, b, c), (_, d, e), (_, _, f) = ellipsoid.sggx(A)
-    adjugate = (
-        (d * f - e * e, c * e - b * f, b * e - c * d),
-        (ZERO, a * f - c * c, b * c - a * e),
-        (ZERO, ZERO, a * d - b * b),
-    )
-    det = determinant(A) ** 2
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = (tuple(part / det for part in row) for row in adjugate)
-    q = (xx + yy + zz) / 3
-    p = root(((xx - q) ** 2 + (yy - q) ** 2 + (zz - q) ** 2 + 2 * (xy**2 + xz**2 + yz**2)) / 6)
-    if p == 0:
-        return q.sqrt()
-    r = determinant(((xx - q, xy, xz), (xy, yy - q, yz), (xz, yz, zz - q))) / (2 * p**3)
-    angle = r.min(ONE).max(-ONE).acos() / 3
-    return (q + 2 * p * angle.cos()).sqrt()
+    with exactly():
+        xx, yy, zz = d * f - e * e, a * f - c * c, a * d - b * b
+        xy, xz, yz = c * e - b * f, b * e - c * d, b * c - a * e
+        trace = xx + yy + zz
+        K = (3 * xx - trace, 3 * xy, 3 * xz), (3 * xy, 3 * yy - trace, 3 * yz), (3 * xz, 3 * yz, 3 * zz - trace)
+        total = dot(K[0], K[0]) + dot(K[1], K[1]) + dot(K[2], K[2])
+        det = determinant(K)
+        gap = total**3 - 54 * det**2
+    angle = arb.atan2(root(gap / 54), det)
+    return root((trace + 2 * root(total / 6) * (angle / 3).cos()) / 3) / abs(determinant(A))
 
 
 def sample_rejection_sphere(u: Sequence[Vector], wi: Vector, A: Matrix) -> tuple[Vec3, arb]:
@@ -111,17 +117,18 @@ def sample_rejection_sphere(u: Sequence[Vector], wi: Vector, A: Matrix) -> tuple
     the lune. The disk's axes are the first two rows of `geometry.basis(wi)`.
     """
     t, b, i = basis(wi)
-    radius, Ai = _longest_half_axis(A), apply(A, i)
+    radius, S = _longest_half_axis(A), ellipsoid.sggx(A)
     for tries, row in enumerate(u, start=1):
         x, y = _disk(row)
-        q = apply(A, add(scale(radius * x, t), scale(radius * y, b)))
+        point = add(scale(radius * x, t), scale(radius * y, b))
         # |A (point + along i)|^2 = 1: the root nearer to the viewer.
-        square, half, rest = dot(Ai, Ai), dot(Ai, q), dot(q, q) - 1
-        discriminant = half**2 - square * rest
+        Si = apply(S, i)
+        whole, half, rest = dot(i, Si), dot(point, Si), dot(point, apply(S, point)) - 1
+        discriminant = square(half) - whole * rest
         if sign(discriminant) < 0:
             continue
-        along = (discriminant.sqrt() - half) / square
-        m = apply(transpose(A), add(q, scale(along, Ai)))
+        along = (discriminant.sqrt() - half) / whole
+        m = apply(S, add(point, scale(along, i)))
         if sign(m[2]) > 0:
             return normalise(m), arb(tries)
     return (ZERO, ZERO, ZERO), ZERO

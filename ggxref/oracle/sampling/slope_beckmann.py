@@ -3,7 +3,7 @@
 from flint import arb
 
 from ggxref.oracle import masking, ndf
-from ggxref.oracle.linalg import ONE, ZERO, Vec3, Vector, dot, normalise
+from ggxref.oracle.linalg import ONE, ZERO, Vec3, Vector, cosine, normalise
 from ggxref.oracle.precision import Undecided, sign
 from ggxref.oracle.roots import increasing_root
 from ggxref.oracle.sampling import sphere, stretched_frame
@@ -62,5 +62,4 @@ def pdf(wm: Vector, wi: Vector, alpha: Vector) -> arb:
     """max(0, wi.m) D(m) / sigma(wi) [1/sr]. heitz2014 (5)."""
     if not sphere.front(wm, wi):
         return arb(0)
-    i, m = normalise(wi), normalise(wm)
-    return dot(i, m) * ndf.beckmann(m, alpha) / masking.sigma_beckmann(i, alpha)
+    return cosine(wi, wm) * ndf.beckmann(wm, alpha) / masking.sigma_beckmann(normalise(wi), alpha)

@@ -28,6 +28,8 @@ def stretch(alpha: Vector) -> Mat3:
 
 def incident(wi: Vector, B: Matrix) -> Vec3:
     """B wi / |B wi|."""
+    if wi[0] == 0 and wi[1] == 0 and wi[2] < 0:
+        raise ValueError("no normal is visible from straight below")
     return normalise(apply(B, wi))
 
 

@@ -3,14 +3,14 @@
 from flint import arb
 
 from ggxref.oracle.linalg import ONE, ZERO, Vec3, Vector, norm, normalise
-from ggxref.oracle.slopes import stretch
+from ggxref.oracle.sampling import sphere
 
 Pair = tuple[arb, arb]
 
 
 def incident(wi: Vector, alpha: Vector) -> tuple[Pair, Pair]:
     """(sin, cos) of the angle of the stretched wi, and (cos, sin) of its azimuth, (1, 0) at normal incidence."""
-    x, y, z = stretch(wi, alpha)
+    x, y, z = sphere.incident(wi, sphere.stretch(alpha))
     s = norm((x, y, ZERO))
     return (s, z), (ONE, ZERO) if s == 0 else (x / s, y / s)
 

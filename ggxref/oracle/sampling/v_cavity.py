@@ -3,7 +3,7 @@
 from flint import arb
 
 from ggxref.oracle import ndf
-from ggxref.oracle.linalg import Vec3, Vector, dot, normalise
+from ggxref.oracle.linalg import Vec3, Vector, cosine, dot, normalise
 from ggxref.oracle.precision import at_least_zero, sign
 from ggxref.oracle.sampling import normals
 
@@ -36,6 +36,6 @@ def pdf(wm: Vector, wi: Vector, alpha: Vector, *, distribution: str = "ggx") -> 
     """2 <i,m> / (<i,m> + <i,m'>) z_m D(m) [1/sr]; 0 where wi is not above the horizon. heitz2014 appendix B."""
     if sign(wi[2]) <= 0 or sign(wm[2]) <= 0 or sign(dot(wi, wm)) <= 0:
         return arb(0)
-    i, m = normalise(wi), normalise(wm)
-    a, b = dot(i, m), at_least_zero(dot(i, _other(m)))
+    m = normalise(wm)
+    a, b = cosine(wi, wm), at_least_zero(cosine(wi, _other(wm)))
     return 2 * a / (a + b) * m[2] * _NDF[distribution](m, alpha)
