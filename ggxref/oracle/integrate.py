@@ -92,13 +92,14 @@ def projected_area_ellipsoid(A: Sequence[Sequence[Number]], bits: int) -> arb:
 
     def density(tau: acb, analytic: bool) -> acb:
         sin, cos = tau.sin_cos()
-        square = sin * sin * dot(ba, ba) - 2 * sin * cos * dot(ba, bc) + cos * cos * dot(bc, bc)
+        square = sin * sin * p - 2 * sin * cos * q + cos * cos * r
         return scale * cos / power_three_halves(square, analytic)
 
     with working(bits):
         A_exact = exact(A)
         a, b, c = transpose(inverse_transpose(A_exact))
         ba, bc = cross(b, a), cross(b, c)
+        p, q, r = dot(ba, ba), dot(ba, bc), dot(bc, bc)
         scale = dot(b, b) / (2 * abs(determinant(A_exact)) * norm(apply(A_exact, N)))
         return integral(density, -arb.pi() / 2, arb.pi() / 2)
 
