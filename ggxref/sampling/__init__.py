@@ -13,6 +13,7 @@ from ggxref.sampling import (
     slope_beckmann,
     slope_ggx,
     spherical_cap,
+    table,
     v_cavity,
 )
 
@@ -26,5 +27,6 @@ __all__ = [
     "slope_beckmann",
     "slope_ggx",
     "spherical_cap",
+    "table",
     "v_cavity",
 ]

@@ -1,0 +1,153 @@
+r"""Visible normals from two tables, for slope densities whose inverse has no formula: heitz2014 §5.3.
+
+Any shape-invariant density serves every α and every anisotropy from one table, because the visible slopes are
+shape-invariant too (9). The tables hold angles instead of slopes, which are infinite at their ends: the slope along is
+tan ψ, the slope across $\sqrt{1 + \tan^2\psi}\,\tan\varphi$, and the normal of the hemisphere
+$(-\sin\psi\cos\varphi, -\sin\varphi, \cos\psi\cos\varphi)$.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from ggxref import stable
+from ggxref._types import Scalar, Vec2, Vec3
+from ggxref.sampling._sphere import incident, unstretch
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Table:
+    """Inverse distribution functions of one slope density at α = 1; an argument for `jit` and `vmap` like any array."""
+
+    psi: Array  # angle of the slope along, by (θi in [0, π/2], column of u0)
+    phi: Array  # angle of the slope across, by (ψ in [-π/2, π/2], column of u1)
+    sigma: Array  # projected area of the visible microsurface, by θi
+    density: Callable[[Vec2], Scalar] = field(metadata={"static": True})
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the two tables."""
+        return self.psi.nbytes + self.phi.nbytes
+
+
+# Cells of the angles' fine grid to a cell of the table, and nodes to such a cell: the integrals at the grid's nodes are
+# then exact to rounding for densities that are smooth in the angle.
+_FINE, _NODES = 16, 4
+
+
+def _running(values, cells):
+    """Integrals from -π/2 to the edges of the grid's cells, from values at the Gauss nodes in them: (..., cells + 1)."""
+    weights = np.polynomial.legendre.leggauss(_NODES)[1] / 2 * (math.pi / cells)
+    steps = (values.reshape(*values.shape[:-1], cells, _NODES) * weights).sum(-1)
+    return np.concatenate([np.zeros((*steps.shape[:-1], 1)), np.cumsum(steps, axis=-1)], axis=-1)
+
+
+def _angles(cells):
+    nodes = (np.polynomial.legendre.leggauss(_NODES)[0] + 1) / 2
+    edges = np.linspace(-math.pi / 2, math.pi / 2, cells + 1)
+    return edges, (edges[:-1, None] + nodes * (math.pi / cells)).ravel()
+
+
+def build(density: Callable[[Vec2], Scalar], *, size: int = 1024) -> Table:
+    r"""Tables for the slope density P22 at α = 1: `size`² numbers each, float32.
+
+    - `density`: isotropic and normalised, from a slope (2,) to a value (); for instance
+      `partial(slopes.student_t, alpha=jnp.ones(2), gamma=4.0)`. Its tails may fall no slower than GGX's.
+    - `size`: at least 2. The paper's is 1024, 8 MB for both.
+
+    heitz2014 (10)–(13) and §5.3.
+    """
+    cells = _FINE * size
+    edges, angle = _angles(cells)
+    coarse = np.sin(np.linspace(0, math.pi / 2, size)) ** 2  # `_column` inverted
+    rows = jax.jit(jax.vmap(jax.vmap(lambda x, y: density(jnp.stack([x, y])), (None, 0)), (0, 0)))
+
+    def joint(psi, phi):
+        """Density per unit of (ψ, φ): (rows, columns)."""
+        x, scale = np.tan(psi)[:, None], 1 / np.cos(psi)[:, None]
+        value = np.asarray(rows(jnp.asarray(x[:, 0]), jnp.asarray(scale * np.tan(phi))), float)
+        return value * scale**3 / np.cos(phi) ** 2
+
+    # Marginal by Gauss–Legendre in φ; then the two running moments that (10) mixes by θ.
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    marginal = joint(angle, nodes * math.pi / 2) @ weights * (math.pi / 2)
+    mass, moment = _running(marginal, cells), _running(marginal * np.tan(angle), cells)
+    psi, sigma = np.empty((size, size)), np.empty(size)
+    for row, theta in enumerate(np.linspace(0, math.pi / 2, size)):
+        below = np.maximum.accumulate(math.cos(theta) * mass - math.sin(theta) * moment)
+        top = np.interp(math.pi / 2 - theta, edges, below)
+        sigma[row] = top
+        psi[row] = np.minimum(np.interp(coarse * top, below, edges), math.pi / 2 - theta)
+
+    # The slope across does not see θ (12). At ψ = ±π/2 both scales are infinite: take the last fine cell's inside.
+    inner = np.clip(np.linspace(-math.pi / 2, math.pi / 2, size), angle[0], angle[-1])
+    phi = np.empty((size, size))
+    for block in np.array_split(np.arange(size), max(size // 64, 1)):
+        across = _running(joint(inner[block], angle), cells)
+        for row, running in zip(block, across, strict=True):
+            phi[row] = np.interp(coarse * running[-1], running, edges)
+    single = (jnp.asarray(a, jnp.float32) for a in (psi, phi, sigma))
+    return Table(*single, density=density)
+
+
+def _bilinear(table: Array, row: Scalar, column: Scalar) -> Scalar:
+    """The table between its entries, at a row and a column in [0, 1]."""
+    last = table.shape[0] - 1
+    r, c = row * last, column * last
+    i, j = jnp.clip(jnp.floor(r), 0, last - 1), jnp.clip(jnp.floor(c), 0, last - 1)
+    s, t = (r - i).astype(row.dtype), (c - j).astype(row.dtype)
+    i, j = i.astype(int), j.astype(int)
+    upper = table[i, j] * (1 - t) + table[i, j + 1] * t
+    lower = table[i + 1, j] * (1 - t) + table[i + 1, j + 1] * t
+    return (upper * (1 - s) + lower * s).astype(row.dtype)
+
+
+def _column(u: Scalar) -> Scalar:
+    """Where `u` stands in a table: the inverses fall off like roots at 0 and 1, and this spreads both ends."""
+    return jnp.arctan2(stable.sqrt(u), stable.sqrt(1 - u)) / (math.pi / 2)
+
+
+def _inclination(i) -> Scalar:
+    """Angle of the stretched direction from n over π/2."""
+    return jnp.arctan2(stable.sqrt(i.x * i.x + i.y * i.y), i.z) / (math.pi / 2)
+
+
+def sample(u: Vec2, wi: Vec3, alpha: Vec2, table: Table) -> Vec3:
+    """Look up the slope along `wi`, then the slope across; rotate and unstretch.
+
+    - `u`: in [0, 1)², (2,). `wi`: unit, (3,), above the horizon. `alpha`: positive, (2,).
+    - Returns a micronormal whose density is `pdf` but for the interpolation: unit, (3,).
+
+    heitz2014 algorithm 4 with the tables of §5.3.
+    """
+    i = incident(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
+    psi = _bilinear(table.psi, _inclination(i), _column(u[0]))
+    phi = _bilinear(table.phi, psi / math.pi + 0.5, _column(u[1]))
+    cos_phi = jnp.cos(phi)
+    along, across = -jnp.sin(psi) * cos_phi, -jnp.sin(phi)
+    cos_i, sin_i = stable.azimuth(i.x, i.y)
+    return unstretch(cos_i * along - sin_i * across, sin_i * along + cos_i * across, jnp.cos(psi) * cos_phi, alpha)
+
+
+def pdf(wm: Vec3, wi: Vec3, alpha: Vec2, table: Table) -> Scalar:
+    r"""$\max(0, \omega_i\cdot\omega_m)\,P^{22}(\tilde x/\alpha_x, \tilde y/\alpha_y)/(\alpha_x\alpha_y z_m^4\,\sigma(\omega_i))$ [1/sr].
+
+    - `wm`, `wi`: unit, (3,); 0 where either is not above the horizon. `alpha`: positive, (2,).
+
+    heitz2014 (6), (7), (8) with the tabulated σ.
+    """
+    i = incident(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
+    theta = _inclination(i)
+    last = table.sigma.shape[0] - 1
+    sigma = i.norm * jnp.interp(theta * last, jnp.arange(last + 1), table.sigma).astype(wm.dtype)
+    cosine = stable.dot(wi, wm)
+    seen = (cosine > 0) & (wm[2] > 0) & (wi[2] > 0)
+    z = jnp.where(seen, wm[2], 1)
+    value = table.density(jnp.stack([-wm[0] / (z * alpha[0]), -wm[1] / (z * alpha[1])]))
+    return jnp.where(seen, cosine * value / (alpha[0] * z**2) / (alpha[1] * z**2) / sigma, 0)
