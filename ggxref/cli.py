@@ -2,17 +2,26 @@
 
 import signal
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from json import dumps
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated
 
 import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from typer.core import TyperGroup
 
 from ggxref.errors import InputError
+from ggxref.files import write_atomically
 
 
 class _Verbs(TyperGroup):
     """The verbs, with bad input turned into one line and exit code 2."""
 
-    def invoke(self, ctx: typer.Context):
+    def invoke(self, ctx):
         try:
             return super().invoke(ctx)
         except InputError as error:
@@ -33,6 +42,110 @@ app = typer.Typer(
 @app.callback()
 def _root() -> None:
     """Several verbs, also while there is only one."""
+
+
+@contextmanager
+def _progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
+    """A bar on the terminal's error stream; calls say how many more are done."""
+    columns = TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task(what, total=total)
+        yield lambda done: progress.advance(task, done)
+
+
+@app.command(epilog="Example: ggxref verify --paper walter2014 --equation 28 --json report.json")
+def verify(
+    paper: Annotated[str | None, typer.Option(metavar="KEY", help="Only the checks of this document.")] = None,
+    equation: Annotated[str | None, typer.Option(metavar="N", help="Only those of this equation or place.")] = None,
+    samples: Annotated[int, typer.Option(help="Random numbers per case of a statistical check.", min=1 << 12)] = 1
+    << 16,
+    json: Annotated[Path | None, typer.Option(metavar="PATH", help="Write the records and errata here too.")] = None,
+) -> None:
+    """Prove the formulas numerically, each beside a wrong one that must fail."""
+    from ggxref.verify import engine, errata, report
+
+    if json and not json.parent.is_dir():
+        raise InputError(f"--json: {json} cannot be written: there is no directory {json.parent}")
+    checks = engine.select(engine.registered(), paper, equation)
+    start, records = perf_counter(), []
+    with _progress("checks", len(checks)) as advance:
+        for record in engine.run(checks, samples):
+            records.append(record)
+            advance(1)
+    seconds = perf_counter() - start
+    report.show(records, seconds, Console())
+    if json:
+        write_atomically(json, report.document(records, errata.found(records), seconds))
+    if not all(r.good for r in records):
+        raise typer.Exit(1)
+
+
+@app.command(epilog="Example: ggxref vectors out --functions ndf,masking.g1_ggx --dtypes f32 --count 1000")
+def vectors(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Where to write the files; made if it is missing.")],
+    functions: Annotated[str, typer.Option(help="Names or modules, separated by commas.")] = "all",
+    dtypes: Annotated[str, typer.Option(help="Of f64, f32, bf16, f16, separated by commas.")] = "all",
+    count: Annotated[
+        int | None, typer.Option(help="Tests in all; without it, each corner of each function once.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Another seed draws other inputs.")] = 1,
+    jobs: Annotated[int, typer.Option(help="Worker processes; they do not change the bytes.", min=1)] = 1,
+    json: Annotated[Path | None, typer.Option(metavar="PATH", help="Write the manifest here too.")] = None,
+) -> None:
+    """Write golden test vectors: inputs as bits, results proven correctly rounded, from the oracle alone."""
+    from ggxref.golden import generate
+
+    order = generate.order(functions, dtypes, count, seed)
+    if directory.exists() and not directory.is_dir():
+        raise InputError(f"{directory}: is a file; vectors are written into a directory")
+    with _progress("tests", sum(order.quotas().values())) as advance:
+        try:
+            manifest = generate.generate(order, directory, jobs, advance)
+            if json:
+                write_atomically(json, dumps(manifest, indent=1) + "\n")
+        except OSError as error:
+            raise InputError(f"{error.filename}: cannot be written: {error.strerror}") from None
+    print(f"{manifest['count']} tests in {len(manifest['files'])} files in {directory}")
+    print(f"SHA-256 of all tests: {manifest['tests_sha256']}")
+
+
+@app.command(epilog="Example: ggxref fit surface.x3p --level 2 --json fit.json --figure fit.pdf")
+def fit(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A BRDF or a height field; its format is recognised.")],
+    model: Annotated[
+        str, typer.Option(help="isotropic, anisotropic, rotated or ellipsoid; auto fits all and chooses.")
+    ] = "auto",
+    fix: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Hold a parameter: alpha=0.1, diffuse=0, A=a,b,…")
+    ] = None,
+    min_cosine: Annotated[float, typer.Option(help="BRDF: leave out directions nearer to the horizon.")] = 0.05,
+    level: Annotated[int, typer.Option(help="Heights: degree of the polynomial that is taken off first.")] = 1,
+    pixel: Annotated[
+        str | None, typer.Option(metavar="DX[,DY]", help="Heights: pixel size in metres, if FILE does not say it.")
+    ] = None,
+    json: Annotated[Path | None, typer.Option(metavar="PATH", help="Write the fit here too.")] = None,
+    figure: Annotated[Path | None, typer.Option(metavar="PATH", help="Draw it: .pdf, .png or .svg.")] = None,
+) -> None:
+    """Fit NDF parameters to measured reflectance or heights, with the simplest model that suffices."""
+    console = Console()
+    with Console(stderr=True).status(f"fitting {file.name}"):
+        from ggxref.fit import fitting, options, readers, report
+
+        options.writable("--json", json)
+        options.writable("--figure", figure)
+        if figure:
+            from ggxref.fit import figures
+
+            figures.check(figure)
+        chosen = {"model": model, "fixed": options.fixed(fix or []), "min_cosine": min_cosine, "degree": level}
+        ladder = fitting.fit(readers.read(file, pixel=options.pixel(pixel)), **chosen)
+        console.print(report.tables(ladder))
+        if json:
+            write_atomically(json, dumps(report.document(ladder, chosen), indent=1) + "\n")
+        if figure:
+            write_atomically(figure, figures.draw(ladder, figure.suffix))
+    if ladder.best.trouble:
+        raise typer.Exit(1)
 
 
 def _interrupted(signum: int, frame: object) -> None:

@@ -80,8 +80,9 @@ def fit(
     else:
         problem = from_surface(measurement, degree=degree)
     held = _fixed(fixed or {}, problem.parameters)
-    fits = fit_models(problem, _wanted(model, problem), held)
-    chosen = selection.choose([fit.model for fit in fits], np.stack([fit.held_out for fit in fits]))
+    fits = fit_models(problem, _wanted(model, problem, held), held)
+    sound = [fit for fit in fits if not fit.trouble] or fits
+    chosen = selection.choose([fit.model for fit in sound], np.stack([fit.held_out for fit in sound]))
     return Ladder(measurement, problem, fits, chosen)
 
 
@@ -94,12 +95,19 @@ def _check(min_cosine: float, degree: int, model: str) -> None:
         raise InputError(f"model {model!r}; need auto or one of {', '.join(models.MODELS)}")
 
 
-def _wanted(model: str, problem: Problem) -> list[str]:
-    if model == "auto":
-        return list(problem.models)
-    if model not in problem.models:
-        raise InputError(f"model {model!r}: {problem.notes[0]}; need one of {', '.join(problem.models)}")
-    return [model]
+def _wanted(model: str, problem: Problem, held: Mapping[str, float]) -> list[str]:
+    """The models to fit: all that hold what is held, or the one that was asked for."""
+    can = [name for name, groups in problem.models.items() if models.admits(groups, held)]
+    if model == "auto" and can:
+        return can
+    if model in can:
+        return [model]
+    if model in problem.models or model == "auto":
+        what = ", ".join(name for name in held if name in models.SHAPE)
+        raise InputError(f"model {model!r} cannot hold these values of {what}")
+    raise InputError(
+        f"model {model!r}: this data cannot tell it from a smaller one; need {' or '.join(problem.models)}"
+    )
 
 
 def _fixed(fixed: Mapping[str, float], parameters: tuple[str, ...]) -> dict[str, float]:
@@ -148,7 +156,7 @@ def _from_starts(problem: Problem, samples: tuple, spaces: list[Space]) -> list[
         best = int(np.argmin(loss))
         row = k * len(loss) + best
         agreeing = int(np.sum(loss <= loss[best] + AGREE))
-        found.append(Found(minima.theta[row], float(loss[best]), bool(minima.found[row]), agreeing))
+        found.append(Found(np.asarray(minima.theta[row]), float(loss[best]), bool(minima.found[row]), agreeing))
     return found
 
 
@@ -176,7 +184,7 @@ def _log_rmse(problem: Problem, samples: tuple, theta: np.ndarray) -> float:
     if problem.objective is not objectives.REFLECTANCE:
         return math.nan
     *directions, measured, _ = samples
-    model, measured = np.asarray(models.brdfs(jnp.asarray(theta), *directions)), np.asarray(measured)
+    model, measured = models.brdfs(theta, *directions), np.asarray(measured)
     positive = measured > 0
     return float(np.sqrt(np.mean(np.log(model[positive] / measured[positive]) ** 2)))
 

@@ -22,6 +22,7 @@ from ggxref.errors import InputError
 
 SHAPE = ("alpha_x", "alpha_y", "shear", "mean_x", "mean_y")
 
+Vector = Array | np.ndarray
 Models = dict[str, tuple[tuple[str, ...], ...]]
 
 MODELS: Models = {
@@ -47,14 +48,23 @@ class Space:
     basis: np.ndarray
 
     @property
+    def columns(self) -> np.ndarray:
+        """The indices of the free directions in y."""
+        return np.flatnonzero(self.basis.any(axis=0))
+
+    @property
     def size(self) -> int:
         """How many directions are free."""
-        return int(self.basis.any(axis=0).sum())
+        return len(self.columns)
+
+    @property
+    def moved(self) -> np.ndarray:
+        """(p,): does the space move this entry of θ?"""
+        return np.array([row.any() for row in self.basis])
 
     def coordinates(self, theta: np.ndarray) -> np.ndarray:
         """The y of the point of the space nearest to θ."""
-        free = self.basis.any(axis=1)
-        return np.linalg.lstsq(self.basis[free], (theta - self.held)[free])[0]
+        return np.linalg.lstsq(self.basis[self.moved], (theta - self.held)[self.moved])[0]
 
 
 def names(bands: tuple[str, ...]) -> tuple[str, ...]:
@@ -145,7 +155,15 @@ def space(
     return Space(held, basis)
 
 
-def shape_matrix(theta: Array) -> Array:
+def admits(groups: tuple[tuple[str, ...], ...], fixed: Mapping[str, float]) -> bool:
+    """Can a model of these groups hold the entries `fixed`? Not a shear where it has none, nor two alphas in one."""
+    known = {name for group in groups for name in group}
+    outside = [value for name, value in fixed.items() if name in SHAPE and name not in known]
+    tied = [{fixed[name] for name in group if name in fixed} for group in groups]
+    return not any(outside) and all(len(values) <= 1 for values in tied)
+
+
+def shape_matrix(theta: Vector) -> Array:
     """The canonical shape matrix A of θ: (3, 3)."""
     zero, one = jnp.zeros_like(theta[0]), jnp.ones_like(theta[0])
     rows = [[jnp.exp(theta[0]), theta[2], zero], [zero, jnp.exp(theta[1]), zero], [-theta[3], -theta[4], one]]
@@ -186,7 +204,15 @@ def brdf(theta: Array, wi: Array, wo: Array, wm: Array) -> Array:
     return bsdf.brdf(wi, wo, D, g2, F) + jnp.exp(diffuse) / math.pi
 
 
-@jax.jit
-def brdfs(theta: Array, wi: Array, wo: Array, wm: Array) -> Array:
-    """`brdf` of many: directions (3, n), values (bands, n)."""
-    return jax.vmap(brdf, (None, -1, -1, -1), -1)(theta, wi, wo, wm)
+_brdfs = jax.jit(jax.vmap(brdf, (None, -1, -1, -1), -1))
+_slope_densities = jax.jit(jax.vmap(slope_density, (None, -1)))
+
+
+def brdfs(theta: Vector, *directions: Vector) -> np.ndarray:
+    """`brdf` of many: wi, wo, wm of shape (3, n), values (bands, n)."""
+    return np.asarray(_brdfs(theta, *directions))
+
+
+def slope_densities(theta: Vector, slopes: Vector) -> np.ndarray:
+    """`slope_density` of many: slopes (2, n), values (n,)."""
+    return np.asarray(_slope_densities(theta, slopes))

@@ -70,21 +70,30 @@ def _solve(objective, samples, held, basis, start, weights):
         # Row by row and not `basis @ y`, so that a held -inf (no diffuse term) meets no product.
         return held + jnp.sum(basis * y, axis=1)
 
-    if objective.residual is None:
-        solver, solve = optx.BFGS(rtol=TOLERANCE, atol=TOLERANCE), optx.minimise
-
-        def function(y):
-            return _mean(objective, theta(y), samples, weights)
-    else:
-        solver = optx.LevenbergMarquardt(rtol=LEAST_SQUARES_TOLERANCE, atol=LEAST_SQUARES_TOLERANCE)
-        solve, roots = optx.least_squares, jnp.sqrt(weights / jnp.sum(weights))
-
-        @_with_jacobian
-        def function(y):
-            return (jax.vmap(objective.residual, (None, -1), -1)(theta(y), samples) * roots).reshape(-1)
-
-    solution = solve(lambda y, _: function(y), solver, start, max_steps=MOST_STEPS, throw=False)
+    solution = (_likelihood if objective.residual is None else _least_squares)(
+        objective, theta, samples, start, weights
+    )
     return Minimum(theta(solution.value), solution.result == optx.RESULTS.successful, solution.stats["num_steps"])
+
+
+def _likelihood(objective, theta, samples, start, weights):
+    solver = optx.BFGS(rtol=TOLERANCE, atol=TOLERANCE)
+
+    def mean(y, _):
+        return _mean(objective, theta(y), samples, weights)
+
+    return optx.minimise(mean, solver, start, max_steps=MOST_STEPS, throw=False)
+
+
+def _least_squares(objective, theta, samples, start, weights):
+    solver = optx.LevenbergMarquardt(rtol=LEAST_SQUARES_TOLERANCE, atol=LEAST_SQUARES_TOLERANCE)
+    roots = jnp.sqrt(weights / jnp.sum(weights))
+
+    @_with_jacobian
+    def residuals(y):
+        return (jax.vmap(objective.residual, (None, -1), -1)(theta(y), samples) * roots).reshape(-1)
+
+    return optx.least_squares(lambda y, _: residuals(y), solver, start, max_steps=MOST_STEPS, throw=False)
 
 
 LANES = 8

@@ -16,7 +16,7 @@ from ggxref.fit.models import Space
 from ggxref.fit.problem import Problem
 from ggxref.fit.solver import losses
 
-SINGULAR = 1e-10
+SINGULAR = 1e-7
 """Smallest eigenvalue of H, over the largest, of a minimum that is a point and not a valley (H scaled to ones)."""
 
 
@@ -53,7 +53,7 @@ def curvature(problem: Problem, samples: tuple[Array, ...], theta: np.ndarray, s
         )
 
     hessian = np.zeros_like(space.basis)
-    for column in np.flatnonzero(space.basis.any(axis=0)):
+    for column in space.columns:
         step = STEP * space.basis[:, column]
         hessian[column] = (scores(theta + step).sum(axis=0) - scores(theta - step).sum(axis=0)) / (2 * STEP)
     return Curvature((hessian + hessian.T) / 2, scores(theta))

@@ -38,7 +38,8 @@ def parse(content: bytes, source: Source, pixel: tuple[float, float] | None) -> 
             raise InputError(f"{source.path}: the file does not say its pixel size; give it, in metres")
         if said[2] != "m":
             raise InputError(f"{source.path}: pixel size in {said[2]!r}; need m")
-        pixel = (_number(said[1], "pixel size", source.path),) * 2
+        side = _number(said[1], "pixel size", source.path)
+        pixel = side, side
     check_pixel(source.path, pixel)
     factor = FACTOR.search(header)
     scale = _number(factor[1], "height conversion factor", source.path) if factor else 1.0
