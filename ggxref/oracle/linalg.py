@@ -17,8 +17,9 @@ N: Vec3 = (ZERO, ZERO, ONE)  # the macrosurface normal
 
 def dot(a: Vector, b: Vector) -> arb:
     """a . b, without rounding where both are exact, so that perpendicular vectors are known as such."""
+    (ax, ay, az), (bx, by, bz) = a, b
     with exactly():
-        return sum((x * y for x, y in zip(a, b, strict=True)), ZERO)
+        return ax * bx + ay * by + az * bz
 
 
 def cross(a: Vector, b: Vector) -> Vec3:
@@ -72,14 +73,14 @@ def normalise(a: Vector) -> Vec3:
 
 def apply(M: Matrix, a: Vector) -> Vec3:
     """M a, without rounding where both are exact."""
-    x, y, z = (dot(row, a) for row in M)
-    return x, y, z
+    r, s, t = M
+    return dot(r, a), dot(s, a), dot(t, a)
 
 
 def transpose(M: Matrix) -> Mat3:
     """The transpose of a 3x3 matrix."""
-    a, b, c = ((x, y, z) for x, y, z in zip(*M, strict=True))
-    return a, b, c
+    (a, b, c), (d, e, f), (g, h, i) = M
+    return (a, d, g), (b, e, h), (c, f, i)
 
 
 def product(L: Matrix, M: Matrix) -> Mat3:
