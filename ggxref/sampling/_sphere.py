@@ -19,6 +19,18 @@ class Incident(NamedTuple):
     fall: Scalar  # 1 - z
 
 
+def ray(x: Scalar, y: Scalar, z: Scalar) -> Incident:
+    """`incident` times a positive factor, ‖(x, y, z)‖ + |z|: a half vector needs no more, and no division is left."""
+    square = x * x + y * y
+    norm = stable.sqrt(square + z * z)
+    below = z < 0
+    factor = norm + jnp.abs(z)
+    # (norm + |z|) factor and (norm - |z|) factor, the latter without its cancellation.
+    large, small = factor * factor, square
+    rise, fall = jnp.where(below, small, large), jnp.where(below, large, small)
+    return Incident(factor * x, factor * y, factor * z, norm, rise, fall)
+
+
 def incident(x: Scalar, y: Scalar, z: Scalar) -> Incident:
     """The sphere-space direction along `(x, y, z)`, which need not be unit."""
     square = x * x + y * y
@@ -33,7 +45,7 @@ def incident(x: Scalar, y: Scalar, z: Scalar) -> Incident:
 
 
 def half_in_cap(u: Vec2, i: Incident, cut: Real) -> tuple[Scalar, Scalar, Scalar]:
-    """`i + c` (not normalised) with `c` uniform on the cap `{z > cut - i.z}`.
+    """`i + c` (not normalised) with `c` uniform on the cap `{z > cut - i.z}`, all in units of i's length.
 
     `cut = 0` is the whole cap of the reflections of the hemisphere (dupuy2023 listing 3); tokuyoshi2024's is
     `(1 - k) i.z`. The cap's height `1 + i.z - cut`, its complement to 2 and `c.z + i.z` are all formed without
@@ -42,7 +54,7 @@ def half_in_cap(u: Vec2, i: Incident, cut: Real) -> tuple[Scalar, Scalar, Scalar
     cos_phi, sin_phi = stable.cos_sin_turn(u[0])
     height, rest = i.rise - cut, i.fall + cut
     depth = u[1] * height  # 1 - c.z
-    sin_theta = stable.sqrt(depth * (2 * (1 - u[1]) + u[1] * rest))
+    sin_theta = stable.sqrt(depth * ((1 - u[1]) * (i.rise + i.fall) + u[1] * rest))
     return sin_theta * cos_phi + i.x, sin_theta * sin_phi + i.y, (1 - u[1]) * height + cut
 
 
@@ -78,4 +90,4 @@ def unstretch(x: Scalar, y: Scalar, z: Scalar, alpha: Vec2) -> Vec3:
 
     dupuy2023 listing 1, line 8 (which warps the incident direction instead of the normal: a misprint).
     """
-    return jnp.stack(stable.unit(alpha[0] * x, alpha[1] * y, z))
+    return stable.direction(alpha[0] * x, alpha[1] * y, z)

@@ -2,10 +2,10 @@
 
 import jax.numpy as jnp
 
-from ggxref import ndf, stable
+from ggxref import ndf, slopes, stable
 from ggxref._types import Scalar, Vec2, Vec3
 from ggxref.ellipsoid import length
-from ggxref.sampling._sphere import half_in_cap, incident, unstretch
+from ggxref.sampling._sphere import half_in_cap, ray, unstretch
 
 
 def _bound_terms(wi, alpha):
@@ -37,7 +37,7 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
 
     tokuyoshi2024.
     """
-    i = incident(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
+    i = ray(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
     return unstretch(*half_in_cap(u, i, _bound_terms(wi, alpha)[1] * i.z), alpha)
 
 
@@ -51,11 +51,10 @@ def pdf(wm: Vec3, wi: Vec3, alpha: Vec2) -> Scalar:
     tokuyoshi2024.
     """
     cosine = stable.dot(wi, wm)
-    i = incident(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
     cut = _bound_terms(wi, alpha)[1]
     # o'_z + i'_z = 2 (ωi·ωm) z_m / (norm q) has to reach (1 − k) z_i / norm.
     q = (wm[0] / alpha[0]) ** 2 + (wm[1] / alpha[1]) ** 2 + wm[2] ** 2
     slack = 1 - 16 * float(jnp.finfo(wm.dtype).eps)
     inside = (cosine > 0) & (2 * cosine * wm[2] >= slack * cut * wi[2] * q)
-    area = i.norm * (i.rise - cut * i.z)
+    area = 2 * slopes.sigma_ggx(wi, alpha) - cut * wi[2]
     return jnp.where(inside, 2 * ndf.ggx(wm, alpha) * cosine / jnp.where(inside, area, 1), 0)

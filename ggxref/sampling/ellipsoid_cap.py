@@ -1,7 +1,5 @@
 """Visible normals of the ellipsoid NDF from a uniform spherical cap: dupuy2023's method after a linear map."""
 
-import jax.numpy as jnp
-
 from ggxref import stable
 from ggxref._types import Mat3, Vec2, Vec3
 from ggxref.ellipsoid import canonical
@@ -20,7 +18,7 @@ def to_sphere(wi: Vec3, canonical_A: Mat3) -> Incident:
 def from_sphere(x, y, z, canonical_A: Mat3) -> Vec3:
     """The micronormal along `Aᵀ (x, y, z)` for a canonical `A`: unit, (3,). Its height is z's sign, exactly."""
     (c00, c10, _), (_, c11, _), (ex, ey, _) = canonical_A
-    return jnp.stack(stable.unit(c00 * x + ex * z, c10 * x + c11 * y + ey * z, z))
+    return stable.direction(c00 * x + ex * z, c10 * x + c11 * y + ey * z, z)
 
 
 def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:

@@ -5,7 +5,7 @@ import math
 import jax.numpy as jnp
 
 from ggxref._types import Scalar, Vec2, Vec3
-from ggxref.sampling._sphere import half_in_cap, incident, unstretch
+from ggxref.sampling._sphere import half_in_cap, ray, unstretch
 from ggxref.sampling._visible import pdf_ggx as pdf
 
 __all__ = ["cap_pdf", "pdf", "sample"]
@@ -19,7 +19,7 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
 
     dupuy2023 listings 1 and 3.
     """
-    return unstretch(*half_in_cap(u, incident(alpha[0] * wi[0], alpha[1] * wi[1], wi[2]), 0), alpha)
+    return unstretch(*half_in_cap(u, ray(alpha[0] * wi[0], alpha[1] * wi[1], wi[2]), 0), alpha)
 
 
 def cap_pdf(wo: Vec3, wi: Vec3) -> Scalar:

@@ -1,0 +1,1 @@
+"""Accuracy, speed, stability and variance of functions, and of the variants of them that are in use elsewhere."""

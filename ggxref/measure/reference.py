@@ -1,0 +1,405 @@
+"""The formulas once more, on double-double components: the fast stand-in for the oracle where millions of points are graded.
+
+Every function has the name and the arguments of its public twin. A direction is a tuple of three arrays and is normalised
+first, `alpha` is two arrays, `A` is rows of three. Forms are chosen to keep digits, not to be fast; each is compared
+with the oracle by `tests/test_measure_reference.py`.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.special import erfcx
+
+from ggxref.measure.doubledouble import DD, PI, cos_sin_turn, exp, log, maximum, minimum, sqrt, where
+
+REFERENCES: dict[str, Callable] = {}
+
+# Known to float64 only, so they grade float32 and narrower.
+FLOAT64_ONLY = {"masking.lambda_beckmann", "masking.g1_beckmann"}
+
+
+def _stands_for(name):
+    def register(function):
+        REFERENCES[name] = function
+        return function
+
+    return register
+
+
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a, b):
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _norm(a):
+    return sqrt(_dot(a, a))
+
+
+def _scaled(c, a):
+    return tuple(c * x for x in a)
+
+
+def _plus(a, b):
+    return tuple(x + y for x, y in zip(a, b, strict=True))
+
+
+def _unit(a):
+    n = _norm(a)
+    n = where(n.hi > 0, n, 1.0)
+    return tuple(x / n for x in a)
+
+
+def _apply(M, a):
+    return tuple(_dot(row, a) for row in M)
+
+
+def _columns(M):
+    return tuple(zip(*M, strict=True))
+
+
+def _cofactor(A):
+    a, b, c = A
+    return _cross(b, c), _cross(c, a), _cross(a, b)
+
+
+def _det(A):
+    return _dot(A[0], _cross(A[1], A[2]))
+
+
+def _positive(x):
+    return maximum(x, 0.0)
+
+
+def _over(a, b):
+    zero = b.hi == 0
+    return where(zero, 0.0, a / where(zero, 1.0, b))
+
+
+# ndf
+
+
+@_stands_for("ndf.ggx")
+def ndf_ggx(wm, alpha):
+    x, y, z = _unit(wm)
+    q = (x / alpha[0]) * (x / alpha[0]) + (y / alpha[1]) * (y / alpha[1]) + z * z
+    return where(z.hi > 0, 1.0 / (PI * alpha[0] * alpha[1] * q * q), 0.0)
+
+
+def _tangent_square(wm, alpha):
+    x, y, z = wm
+    z = where(z.hi > 0, z, 1.0)
+    a, b = x / (alpha[0] * z), y / (alpha[1] * z)
+    return a * a + b * b
+
+
+@_stands_for("ndf.beckmann")
+def ndf_beckmann(wm, alpha):
+    z = _unit(wm)[2]
+    above = z.hi > 0
+    square = where(above, z, 1.0) * where(above, z, 1.0)
+    exponent = maximum(-_tangent_square(wm, alpha), -600.0)
+    seen = above & (exponent.hi > -600)
+    return where(seen, exp(exponent) / (PI * alpha[0] * alpha[1] * square * square), 0.0)
+
+
+@_stands_for("ndf.student_t")
+def ndf_student_t(wm, alpha, gamma):
+    z = _unit(wm)[2]
+    above = z.hi > 0
+    square = where(above, z, 1.0) * where(above, z, 1.0)
+    g = gamma - 1.0
+    power = exp(-(gamma * log(1.0 + _tangent_square(wm, alpha) / g)))
+    return where(above, power / (PI * alpha[0] * alpha[1] * square * square), 0.0)
+
+
+@_stands_for("ndf.ellipsoid")
+def ndf_ellipsoid(wm, A):
+    wm = _unit(wm)
+    det = _det(A)
+    stretched = _scaled(1.0 / det, _apply(_cofactor(A), wm))
+    square = _dot(stretched, stretched)
+    return where(wm[2].hi > 0, 1.0 / (PI * abs(det) * _norm(_columns(A)[2]) * square * square), 0.0)
+
+
+# masking
+
+
+def _flat(w, alpha):
+    return (alpha[0] * w[0]) * (alpha[0] * w[0]) + (alpha[1] * w[1]) * (alpha[1] * w[1])
+
+
+def _sigma_ggx(w, alpha):
+    square = _flat(w, alpha)
+    t = sqrt(square + w[2] * w[2])
+    below = w[2].hi < 0
+    return where(below, square / where(below, t - w[2], 1.0), t + w[2]) * 0.5
+
+
+def _up(w):
+    return tuple(where(w[2].hi < 0, -x, x) for x in w)
+
+
+def _front(w, wm):
+    return np.sign(_dot(w, wm).hi) * np.sign(w[2].hi) > 0
+
+
+@_stands_for("masking.lambda_ggx")
+def masking_lambda_ggx(w, alpha):
+    w = _unit(w)
+    square = _flat(w, alpha)
+    z = abs(w[2])
+    return square / (2.0 * z * (z + sqrt(square + z * z)))
+
+
+def _gaussian_area(w, alpha):
+    """float64: erfcx has no double-double. Its error is below 1e-13, as 1/√π − a erfcx(a) cancels by 2a² < 400."""
+    s = np.sqrt(_flat(w, alpha).hi)
+    a = np.abs(w[2].hi) / np.where(s > 0, s, 1)
+    tail = (1 / np.sqrt(np.pi) - a * erfcx(a)) * np.exp(-a * a)
+    return DD(np.where((s > 0) & (a < 26), s * tail / 2, 0), np.zeros_like(s))
+
+
+@_stands_for("masking.lambda_beckmann")
+def masking_lambda_beckmann(w, alpha):
+    w = _unit(w)
+    return _gaussian_area(w, alpha) / abs(w[2])
+
+
+@_stands_for("masking.g1_ggx")
+def masking_g1_ggx(w, wm, alpha):
+    up = _up(_unit(w))
+    return where(_front(w, wm), up[2] / _sigma_ggx(up, alpha), 0.0)
+
+
+@_stands_for("masking.g1_beckmann")
+def masking_g1_beckmann(w, wm, alpha):
+    up = _up(_unit(w))
+    return where(_front(w, wm), _over(up[2], up[2] + _gaussian_area(up, alpha)), 0.0)
+
+
+@_stands_for("masking.g1_v_cavity")
+def masking_g1_v_cavity(w, wm):
+    w, wm = _unit(w), _unit(wm)
+    return where(_front(w, wm), minimum(_over(2.0 * abs(wm[2] * w[2]), abs(_dot(w, wm))), 1.0), 0.0)
+
+
+def _sigma_ellipsoid(w, A):
+    n = _columns(A)[2]
+    Aw = _apply(A, w)
+    product, cosine = _norm(Aw) * _norm(n), _dot(Aw, n)
+    cross = _cross(Aw, n)
+    below = cosine.hi < 0
+    total = where(below, _dot(cross, cross) / where(below, product - cosine, 1.0), product + cosine)
+    return total / (2.0 * _dot(n, n))
+
+
+@_stands_for("masking.g1_ellipsoid")
+def masking_g1_ellipsoid(w, wm, A):
+    up = _up(_unit(w))
+    return where(_front(w, wm), minimum(_over(up[2], _sigma_ellipsoid(up, A)), 1.0), 0.0)
+
+
+@_stands_for("masking.g2_height_correlated")
+def masking_g2_height_correlated(g1_i, g1_o):
+    return _over(g1_i * g1_o, g1_i + g1_o - g1_i * g1_o)
+
+
+@_stands_for("masking.g2_separable")
+def masking_g2_separable(g1_i, g1_o):
+    return g1_i * g1_o
+
+
+@_stands_for("masking.g2_v_cavity")
+def masking_g2_v_cavity(wi, wo, wm):
+    a, b = masking_g1_v_cavity(wi, wm), masking_g1_v_cavity(wo, wm)
+    return where(wo[2].hi > 0, minimum(a, b), _positive(a + b - 1.0))
+
+
+# fresnel
+
+
+@_stands_for("fresnel.schlick")
+def fresnel_schlick(cos_i, f0):
+    c = 1.0 - abs(cos_i)
+    return f0 + (1.0 - f0) * (c * c) * (c * c) * c
+
+
+@_stands_for("fresnel.dielectric")
+def fresnel_dielectric(cos_i, eta):
+    c = abs(cos_i)
+    square = 1.0 - eta * eta + (eta * c) * (eta * c)
+    ct = sqrt(square)
+    s, p = _over(eta * c - ct, eta * c + ct), _over(c - eta * ct, c + eta * ct)
+    value = (s * s + p * p) * 0.5
+    gap = (1.0 - eta * eta).hi
+    return where(gap == 0, 0.0, where((square.hi <= 0) & (gap < 0), 1.0, value))
+
+
+# jacobians, directions, areas
+
+
+@_stands_for("jacobian.reflection")
+def jacobian_reflection(wo, wm):
+    return 1.0 / (4.0 * abs(_dot(_unit(wo), _unit(wm))))
+
+
+@_stands_for("jacobian.refraction")
+def jacobian_refraction(wi, wo, wm, n_i, n_o):
+    wi, wo, wm = _unit(wi), _unit(wo), _unit(wm)
+    o = _dot(wo, wm)
+    total = n_i * _dot(wi, wm) + n_o * o
+    return n_o * n_o * abs(o) / (total * total)
+
+
+@_stands_for("jacobian.slope")
+def jacobian_slope(wm):
+    z = _unit(wm)[2]
+    return 1.0 / (z * z * z)
+
+
+@_stands_for("jacobian.linear")
+def jacobian_linear(wm, M):
+    stretched = _norm(_apply(M, _unit(wm)))
+    return abs(_det(M)) / (stretched * stretched * stretched)
+
+
+@_stands_for("ellipsoid.projected_area")
+def ellipsoid_projected_area(w, A, size):
+    return PI * size * size * _norm(_apply(A, _unit(w))) / abs(_det(A))
+
+
+@_stands_for("ellipsoid.lune_area")
+def ellipsoid_lune_area(u, v, A, size):
+    u, v = _apply(A, _unit(u)), _apply(A, _unit(v))
+    product, cosine = _norm(u) * _norm(v), _dot(u, v)
+    cross = _cross(u, v)
+    below = cosine.hi < 0
+    total = where(below, _dot(cross, cross) / where(below, product - cosine, 1.0), product + cosine)
+    return PI * size * size * total / (2.0 * abs(_det(A)) * _norm(v))
+
+
+@_stands_for("geometry.reflect")
+def geometry_reflect(w, wm):
+    w, wm = _unit(w), _unit(wm)
+    return _plus(_scaled(2.0 * _dot(w, wm), wm), _scaled(-1.0, w))
+
+
+@_stands_for("geometry.half_reflection")
+def geometry_half_reflection(wi, wo):
+    return _unit(_plus(_unit(wi), _unit(wo)))
+
+
+# densities
+
+
+def _visible(wm, wi, D, sigma):
+    cosine = _dot(_unit(wi), _unit(wm))
+    return where(cosine.hi > 0, _over(cosine * D, sigma), 0.0)
+
+
+@_stands_for("sampling.spherical_cap.pdf")
+def sampling_spherical_cap_pdf(wm, wi, alpha):
+    return _visible(wm, wi, ndf_ggx(wm, alpha), _sigma_ggx(_unit(wi), alpha))
+
+
+@_stands_for("sampling.ellipsoid_cap.pdf")
+def sampling_ellipsoid_cap_pdf(wm, wi, A):
+    return _visible(wm, wi, ndf_ellipsoid(wm, A), _sigma_ellipsoid(_unit(wi), A))
+
+
+@_stands_for("sampling.normals.pdf_ggx")
+def sampling_normals_pdf_ggx(wm, alpha):
+    return ndf_ggx(wm, alpha) * _unit(wm)[2]
+
+
+def _bound_terms(wi, alpha):
+    a = minimum(minimum(alpha[0], alpha[1]), 1.0)
+    s = 1.0 + sqrt(wi[0] * wi[0] + wi[1] * wi[1])
+    denominator = s * s + (a * wi[2]) * (a * wi[2])
+    above = wi[2].hi > 0
+    k = where(above, (1.0 - a) * (1.0 + a) * s * s / denominator, 1.0)
+    return k, where(above, a * a * (s * s + wi[2] * wi[2]) / denominator, 0.0)
+
+
+@_stands_for("sampling.bounded_cap.bound")
+def sampling_bounded_cap_bound(wi, alpha):
+    return _bound_terms(_unit(wi), alpha)[0]
+
+
+# samplers
+
+
+def _sphere(wi, alpha):
+    x, y, z = _unit(wi)
+    return alpha[0] * x, alpha[1] * y, z
+
+
+def _half_in_cap(u, i, cut):
+    """Half vector in sphere space, times the length of `i` (not unit); the cap is {z > cut − i_z} in the same unit."""
+    square = i[0] * i[0] + i[1] * i[1]
+    t = sqrt(square + i[2] * i[2])
+    large = t + abs(i[2])
+    small = square / large
+    below = i[2].hi < 0
+    height, rest = where(below, small, large) - cut, where(below, large, small) + cut
+    c, s = cos_sin_turn(u[0])
+    depth = u[1] * height
+    radius = sqrt(depth * (2.0 * (1.0 - u[1]) * t + u[1] * rest))
+    return radius * c + i[0], radius * s + i[1], (1.0 - u[1]) * height + cut
+
+
+@_stands_for("sampling.spherical_cap.sample")
+def sampling_spherical_cap_sample(u, wi, alpha):
+    x, y, z = _half_in_cap(u, _sphere(wi, alpha), 0.0)
+    return _unit((alpha[0] * x, alpha[1] * y, z))
+
+
+@_stands_for("sampling.bounded_cap.sample")
+def sampling_bounded_cap_sample(u, wi, alpha):
+    i = _sphere(wi, alpha)
+    x, y, z = _half_in_cap(u, i, _bound_terms(_unit(wi), alpha)[1] * i[2])
+    return _unit((alpha[0] * x, alpha[1] * y, z))
+
+
+@_stands_for("sampling.cross_section.sample")
+def sampling_cross_section_sample(u, wi, alpha):
+    """dupuy2023 listing 2, in the frame of the stretched ω_i; double-double carries its cancellations."""
+    i = _unit(_sphere(wi, alpha))
+    flat = sqrt(i[0] * i[0] + i[1] * i[1])
+    pole = flat.hi == 0
+    safe = where(pole, 1.0, flat)
+    w1 = where(pole, 1.0, -i[1] / safe), where(pole, 0.0, i[0] / safe), flat * 0.0
+    w2 = _cross(i, w1)
+    c, s = cos_sin_turn(u[0])
+    r = sqrt(u[1])
+    t1, t2 = r * c, r * s
+    blend = (1.0 + i[2]) * 0.5
+    t2 = (1.0 - blend) * sqrt(1.0 - t1 * t1) + blend * t2
+    t3 = sqrt(1.0 - t1 * t1 - t2 * t2)
+    x, y, z = _plus(_plus(_scaled(t1, w1), _scaled(t2, w2)), _scaled(t3, i))
+    return _unit((alpha[0] * x, alpha[1] * y, _positive(z)))
+
+
+@_stands_for("sampling.normals.sample_ggx")
+def sampling_normals_sample_ggx(u, alpha):
+    c, s = cos_sin_turn(u[0])
+    r = sqrt(u[1])
+    return _unit((alpha[0] * r * c, alpha[1] * r * s, sqrt(1.0 - u[1])))
+
+
+@_stands_for("sampling.ellipsoid_cap.sample")
+def sampling_ellipsoid_cap_sample(u, wi, A):
+    """The canonical form by the Cholesky factor of S = AᵀA/‖An‖², as design.md defines it."""
+    rows = _columns(A)
+    n = _dot(rows[2], rows[2])
+    ex, ey = _dot(rows[0], rows[2]) / n, _dot(rows[1], rows[2]) / n
+    c00 = sqrt(_dot(rows[0], rows[0]) / n - ex * ex)
+    c10 = (_dot(rows[0], rows[1]) / n - ex * ey) / c00
+    c11 = abs(_det(A)) / (n * sqrt(n) * c00)
+    x, y, z = _unit(wi)
+    i = c00 * x + c10 * y, c11 * y, ex * x + ey * y + z
+    x, y, z = _half_in_cap(u, i, 0.0)
+    return _unit((c00 * x + ex * z, c10 * x + c11 * y + ey * z, z))
