@@ -15,7 +15,7 @@ DIGITS = 40
 LARGEST_EXPONENT = 30000
 
 
-class Undecided(Exception):
+class Undecided(ArithmeticError):
     """The enclosure is too wide to prove the rounding."""
 
 
@@ -136,7 +136,7 @@ def ends(ball: arb) -> tuple[Fraction, Fraction]:
     if not ball.is_finite():
         raise Undecided("the enclosure is not finite")
     mid, rad = ball.mid(), ball.rad()
-    if mid != 0 and abs(int(mid.man_exp()[1])) > LARGEST_EXPONENT:
+    if any(part != 0 and abs(int(part.man_exp()[1])) > LARGEST_EXPONENT for part in (mid, rad)):
         raise OverflowError("the result is beyond 2^±30000: too long to write, and no dtype holds it")
     centre, radius = dyadic(mid), dyadic(rad)
     return centre - radius, centre + radius

@@ -1,0 +1,91 @@
+"""From a function, a dtype and an index to the input of one test: exact numbers and their bits."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from ggxref.golden.catalogue import Function
+from ggxref.golden.inputs import Draw
+from ggxref.golden.rounding import Format, decode, encode
+from ggxref.golden.stream import Stream
+from ggxref.golden.themes import Theme, themes
+
+DIRECTIONS = frozenset({"wi", "wo", "wm"})
+
+
+@dataclass(frozen=True)
+class Case:
+    """The input of one test. `bits` and `values` are keyed by argument; vectors and matrices are nested tuples."""
+
+    function: Function
+    fmt: Format
+    theme: Theme
+    bits: dict[str, Any]
+    values: dict[str, Any]
+
+    def quantity(self, name: str) -> list[Any]:
+        """Values of the arguments that were drawn as that quantity."""
+        return [self.values[a] for a, q in self.function.arguments.items() if q == name]
+
+    def directions(self) -> dict[str, Any]:
+        return {a: self.values[a] for a, q in self.function.arguments.items() if q in DIRECTIONS}
+
+
+def mapped(f: Callable[[Any], Any], x: Any) -> Any:
+    """`f` of each leaf of nested tuples (or lists)."""
+    return tuple(mapped(f, part) for part in x) if isinstance(x, tuple | list) else f(x)
+
+
+def leaves(x: Any) -> Iterator[Any]:
+    if isinstance(x, tuple | list):
+        for part in x:
+            yield from leaves(part)
+    elif isinstance(x, dict):
+        yield from leaves(tuple(x.values()))
+    else:
+        yield x
+
+
+def swapped(quantity: str, x: Any) -> Any:
+    """The quantity after x and y change places."""
+    match quantity:
+        case "scatter":
+            (a, b), (c, d) = x
+            return (d, c), (b, a)
+        case "A":
+            return tuple((row[1], row[0], row[2]) for row in x)
+        case "wi" | "wo" | "wm" | "alpha" | "mean" | "slope":
+            return (x[1], x[0], *x[2:])
+    return x
+
+
+def stretched(s: Stream, fmt: Format, quantity: str, x: Any) -> Any:
+    """A direction made a few ulp longer or shorter, as after a chain of reflections."""
+    if quantity not in DIRECTIONS:
+        return x
+    factor = 1 + s.sign() * Fraction(2 + s.below(7), 1 << fmt.precision)
+    return tuple(factor * c for c in x)
+
+
+def case(seed: int, function: Function, fmt: Format, index: int) -> Case | None:
+    """The input of candidate number `index`; None where it is outside the function's domain."""
+    cycle = themes(function)
+    theme = cycle[index % len(cycle)]
+    post = theme.get("_post")
+    # A swapped case repeats the draws of the corner before it; between two corners stands a plain draw.
+    label = seed, function.name, fmt.name, index - 2 if post == "swap" else index
+    drawn = Draw(label, fmt, theme)
+    exact = {argument: getattr(drawn, quantity) for argument, quantity in function.arguments.items()}
+    if post == "swap":
+        exact = {a: swapped(q, exact[a]) for a, q in function.arguments.items()}
+    if post == "stretch":
+        exact = {a: stretched(Stream(*label, "stretch", a), fmt, q, exact[a]) for a, q in function.arguments.items()}
+    bits = {a: mapped(lambda x: encode(x, fmt), x) for a, x in exact.items()}
+    if post == "minus zero":
+        negative = {a for a, q in function.arguments.items() if q in DIRECTIONS}
+        bits = {a: mapped(lambda b: b or fmt.sign, b) if a in negative else b for a, b in bits.items()}
+    values = {a: mapped(lambda b: decode(b, fmt), b) for a, b in bits.items()}
+    if any(values[a][2] <= 0 for a in function.above):
+        return None
+    return Case(function, fmt, theme, bits, values)

@@ -1,0 +1,176 @@
+"""Reading vectors, and refusing what is not: each error says which file and place, what it wants, and what it got."""
+
+import hashlib
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ggxref.errors import InputError
+from ggxref.golden.catalogue import Function
+from ggxref.golden.generate import MANIFEST, MANIFEST_SCHEMA, SCHEMA
+from ggxref.golden.rounding import FORMATS, Format, from_hex
+from ggxref.golden.samplers import FUNCTIONS
+
+# No honest file is larger; a manifest's claims are checked against it before anything is read.
+LARGEST_FILE = 1 << 30
+# Outermost length and so on of each quantity; a number is ().
+SHAPES = {
+    "A": (3, 3),
+    "wi": (3,),
+    "wo": (3,),
+    "wm": (3,),
+    "u3": (3,),
+    "rows": (4, 2),
+    "scatter": (2, 2),
+    "angles": (3,),
+}
+SHAPES |= dict.fromkeys(("alpha", "u", "mean", "slope"), (2,))
+
+
+@dataclass(frozen=True)
+class Test:
+    """One test: bits of inputs and result, nested as the function takes and returns them."""
+
+    function: Function
+    fmt: Format
+    id: int
+    flags: tuple[str, ...]
+    inputs: dict[str, Any]
+    exact: Any
+    expected: Any
+    condition: float
+    ulp: int
+
+
+def need(condition: object, message: str) -> None:
+    if not condition:
+        raise InputError(message)
+
+
+def object_of(text: bytes, where: str) -> dict[str, Any]:
+    """The JSON object in a file."""
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{where}: not JSON: {error}") from None
+    need(isinstance(value, dict), f"{where}: wanted a JSON object, got {kind(value)}")
+    return value
+
+
+def kind(value: Any) -> str:
+    text = repr(value)
+    return f"{type(value).__name__} {text if len(text) < 60 else text[:57] + '...'}"
+
+
+def entry(record: dict[str, Any], key: str, wanted: type | tuple[type, ...], where: str) -> Any:
+    """`record[key]`, of the wanted type."""
+    need(key in record, f"{where}: {key!r} is missing")
+    value = record[key]
+    names = wanted.__name__ if isinstance(wanted, type) else " or ".join(t.__name__ for t in wanted)
+    right = isinstance(value, wanted) and not isinstance(value, bool)
+    need(right, f"{where}: {key!r} wants {names}, got {kind(value)}")
+    return value
+
+
+def choice(value: str, among: dict[str, Any], what: str, where: str) -> Any:
+    need(value in among, f"{where}: unknown {what} {value!r}")
+    return among[value]
+
+
+def shape_of(value: Any) -> tuple[int, ...] | None:
+    """Shape of a nested list of strings; None if it is ragged or anything else."""
+    if isinstance(value, str):
+        return ()
+    if not isinstance(value, list) or not value:
+        return None
+    shapes = {shape_of(part) for part in value}
+    inner = shapes.pop()
+    return None if shapes or inner is None else (len(value), *inner)
+
+
+def words(value: Any, fmt: Format, where: str) -> Any:
+    """Bits of nested hex strings."""
+    if isinstance(value, list):
+        return tuple(words(part, fmt, where) for part in value)
+    need(isinstance(value, str), f"{where}: wanted a hex string, got {kind(value)}")
+    try:
+        return from_hex(value, fmt)
+    except ValueError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def test(record: Any, function: Function, fmt: Format, flags: dict[str, str], where: str) -> Test:
+    """A test from its JSON."""
+    need(isinstance(record, dict), f"{where}: wanted a JSON object, got {kind(record)}")
+    inputs = entry(record, "inputs", dict, where)
+    wanted, got = set(function.arguments), set(inputs)
+    need(wanted == got, f"{where}: {function.name} takes {sorted(wanted)}, got {sorted(got)}")
+    for argument, quantity in function.arguments.items():
+        shape, expected = shape_of(inputs[argument]), SHAPES.get(quantity, ())
+        need(shape == expected, f"{where}: {argument!r} wants shape {expected}, got {kind(inputs[argument])}")
+    named = entry(record, "flags", list, where)
+    for flag in named:
+        need(isinstance(flag, str) and flag in flags, f"{where}: flag {flag!r} is not in the file's list")
+    ulp, condition = entry(record, "ulp", int, where), entry(record, "condition", (int, float), where)
+    need(ulp >= 0, f"{where}: 'ulp' wants a number >= 0, got {ulp}")
+    need(condition >= 0 and math.isfinite(condition), f"{where}: 'condition' wants a number >= 0, got {condition}")
+    return Test(
+        function,
+        fmt,
+        entry(record, "id", int, where),
+        tuple(named),
+        {a: words(x, fmt, f"{where}, {a}") for a, x in inputs.items()},
+        entry(record, "exact", (str, list), where),
+        words(entry(record, "expected", (str, list), where), fmt, f"{where}, expected"),
+        condition,
+        ulp,
+    )
+
+
+def tests(text: bytes, where: str) -> Iterator[Test]:
+    """The tests of one file."""
+    document = object_of(text, where)
+    schema = entry(document, "schema", str, where)
+    need(schema == SCHEMA, f"{where}: wanted schema {SCHEMA!r}, got {schema!r}")
+    name, options = entry(document, "function", str, where), document.get("options", {})
+    need(isinstance(options, dict), f"{where}: 'options' wants a JSON object, got {kind(options)}")
+    function = choice(".".join([name, *map(str, options.values())]), FUNCTIONS, "function", where)
+    flags = entry(document, "flags", dict, where)
+    claimed, seen = entry(document, "count", int, where), 0
+    for group in entry(document, "groups", list, where):
+        need(isinstance(group, dict), f"{where}: a group wants a JSON object, got {kind(group)}")
+        fmt = choice(entry(group, "dtype", str, where), FORMATS, "dtype", where)
+        for place, record in enumerate(entry(group, "tests", list, where), 1):
+            yield test(record, function, fmt, flags, f"{where}: {fmt.name} test {place}")
+            seen += 1
+    need(seen == claimed, f"{where}: 'count' says {claimed} tests, the file holds {seen}")
+
+
+def contents(path: Path) -> bytes:
+    try:
+        size = path.stat().st_size
+        need(size <= LARGEST_FILE, f"{path}: {size} bytes, more than the {LARGEST_FILE} that a vector file may have")
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def read(directory: Path) -> Iterator[Test]:
+    """The tests of a directory of vectors, each file checked against the manifest."""
+    path = directory / MANIFEST
+    manifest = object_of(contents(path), str(path))
+    schema = entry(manifest, "schema", str, str(path))
+    need(schema == MANIFEST_SCHEMA, f"{path}: wanted schema {MANIFEST_SCHEMA!r}, got {schema!r}")
+    for name, claim in entry(manifest, "files", dict, str(path)).items():
+        where = f"{path}: {name!r}"
+        # A name is a file of this directory, and nothing else on the machine.
+        need(name == Path(name).name and name.endswith(".json"), f"{where} is not the name of a vector file")
+        need(isinstance(claim, dict), f"{where} wants a JSON object, got {kind(claim)}")
+        data = contents(directory / name)
+        for key, value in {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}.items():
+            claimed = entry(claim, key, type(value), where)
+            need(claimed == value, f"{directory / name}: the manifest says {key} {claimed}, the file has {value}")
+        yield from tests(data, str(directory / name))

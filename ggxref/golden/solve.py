@@ -1,0 +1,83 @@
+"""One test: the exact result of a case from the oracle, with every rounding proven."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from flint import arb
+
+from ggxref.golden.budget import allowance, condition
+from ggxref.golden.cases import Case, leaves, mapped
+from ggxref.golden.catalogue import Function
+from ggxref.golden.flags import flags_of
+from ggxref.golden.rounding import DIGITS, Format, Undecided, decimal_ball, ends, round_ball, to_hex
+from ggxref.golden.stressed import Stressed
+from ggxref.oracle.precision import MAX_BITS, evaluate, working
+
+# 40 digits are 133 bits: nearly every case is decided at once.
+FIRST_BITS = 192
+
+
+@dataclass(frozen=True)
+class Exact:
+    """Result of a case: `expected` bits, `digits`, and `values` (None: infinite), nested as the function returns it."""
+
+    expected: Any
+    digits: Any
+    values: tuple[Fraction | None, ...]
+
+
+def proven(function: Function, inputs: dict[str, Any], fmt: Format) -> Exact:
+    """The result at the first precision that proves all of its roundings; `Undecided` if none does."""
+    bits, inputs = FIRST_BITS, inputs | function.options
+    while True:
+        try:
+            with working(bits):
+                result = evaluate(function.name, inputs, bits)
+                return Exact(
+                    mapped(lambda ball: bits_of(ball, fmt), result), mapped(digits_of, result), values_of(result)
+                )
+        except Undecided:
+            if bits == MAX_BITS:
+                raise
+            bits = min(2 * bits, MAX_BITS)
+
+
+def bits_of(ball: arb, fmt: Format) -> int:
+    return fmt.infinity | (fmt.sign if ball < 0 else 0) if is_infinite(ball) else round_ball(ball, fmt)
+
+
+def digits_of(ball: arb) -> str:
+    return ("-inf" if ball < 0 else "inf") if is_infinite(ball) else decimal_ball(ball, DIGITS)
+
+
+def is_infinite(ball: arb) -> bool:
+    """Whether the result is proven infinite: Λ at the horizon."""
+    return ball == arb.pos_inf() or ball == arb.neg_inf()
+
+
+def values_of(result: Any) -> tuple[Fraction | None, ...]:
+    return tuple(None if is_infinite(ball) else sum(ends(ball), Fraction(0)) / 2 for ball in leaves(result))
+
+
+def test(case: Case) -> dict[str, Any] | None:
+    """The test's record but for its id; None where it has no proven or no useful result."""
+    fmt = case.fmt
+    try:
+        exact = proven(case.function, case.values, fmt)
+        kappa = condition(case)
+    except (ArithmeticError, ValueError):
+        # A result exactly on a decision (a tie, a jump), beyond every dtype, or outside the function's domain.
+        return None
+    ulp = allowance(case, kappa)
+    if ulp > 1 << (fmt.precision - 2) and kappa:
+        # Half an ulp of the input moves the result by a quarter of itself: nothing is tested.
+        return None
+    return {
+        "flags": flags_of(Stressed(case, exact.values)),
+        "inputs": {a: mapped(lambda b: to_hex(b, fmt), bits) for a, bits in case.bits.items()},
+        "exact": exact.digits,
+        "expected": mapped(lambda b: to_hex(b, fmt), exact.expected),
+        "condition": float(kappa),
+        "ulp": ulp,
+    }
