@@ -1,0 +1,71 @@
+"""Misprints of the documents. Each is a check: it passes for the corrected form, and its control is the printed form."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from ggxref.verify import engine
+from ggxref.verify.engine import Record
+
+
+@dataclass(frozen=True)
+class Erratum:
+    """Where a document is wrong, what it prints, what it should. `origin`: "print", or "converter" if that is likelier."""
+
+    paper: str
+    place: str
+    printed: str
+    correct: str
+    origin: str
+
+    @property
+    def statement(self) -> str:
+        return f"erratum: {self.correct}, not {self.printed}"
+
+
+_errata: list[Erratum] = []
+
+
+def erratum(
+    paper: str,
+    place: str,
+    printed: str,
+    correct: str,
+    method: str,
+    functions: str | Callable | Sequence,
+    *,
+    tolerance: float,
+    change: Callable,
+    origin: str = "print",
+    **settings,
+):
+    """Register the decorated body as the check of a misprint; `change` makes the printed form of the first function."""
+    entry = Erratum(paper, place, printed, correct, origin)
+    _errata.append(entry)
+    mutant = (f"as printed: {printed}", change)
+    return engine.check(
+        paper, place, entry.statement, method, functions, tolerance=tolerance, mutant=mutant, **settings
+    )
+
+
+def found(records: Sequence[Record]) -> list[dict]:
+    """The misprints among the checks that were run, with the numbers that show them."""
+    by_name = {(r.paper, r.statement): r for r in records}
+    listed = []
+    for e in _errata:
+        record = by_name.get((e.paper, e.statement))
+        if record is not None:
+            fields = {
+                "paper": e.paper,
+                "place": e.place,
+                "printed": e.printed,
+                "correct": e.correct,
+                "origin": e.origin,
+            }
+            listed.append({**fields, "evidence": evidence(record)})
+    return listed
+
+
+def evidence(r: Record) -> str:
+    return (
+        f"error {r.error:.1e} as corrected, {r.control.error:.1e} as printed (tolerance {r.tolerance:.0e}, {r.method})"
+    )
