@@ -73,7 +73,7 @@ def verify(
             records.append(record)
             advance(1)
     seconds = perf_counter() - start
-    report.show(records, seconds, Console())
+    report.show(records, seconds)
     if json:
         write_atomically(json, report.document(records, errata.found(records), seconds))
     if not all(r.good for r in records):
