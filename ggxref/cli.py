@@ -148,6 +148,28 @@ def fit(
         raise typer.Exit(1)
 
 
+@app.command(epilog="Example: ggxref chart pareto --out figures")
+def chart(
+    kind: Annotated[str, typer.Argument(help="accuracy, speed, pareto, stability, variance, gradient, or all.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where PNG, SVG and CSV go; made if it is not there.")],
+    points: Annotated[
+        int, typer.Option(help="Points a region in float32; a million for a final figure.", min=1 << 10)
+    ] = 1 << 16,
+) -> None:
+    """Measure and draw: accuracy, speed, one against the other, where forms fail. Run it again to go on after a stop."""
+    from ggxref.measure import run, tables
+
+    if kind != "all" and kind not in tables.KINDS:
+        raise InputError(f"chart {kind}: there are {', '.join(tables.KINDS)}, and all")
+    if out.exists() and not out.is_dir():
+        raise InputError(f"--out: {out} is a file, not a directory")
+    out.mkdir(parents=True, exist_ok=True)
+    for one in tables.KINDS if kind == "all" else [kind]:
+        with _progress(one, len(tables.KINDS[one](points))) as advance:
+            written = run.chart(one, out, points, advance)
+        print("\n".join(map(str, written)))
+
+
 def _interrupted(signum: int, frame: object) -> None:
     print("ggxref: interrupted", file=sys.stderr)
     raise SystemExit(130)

@@ -174,13 +174,21 @@ def _mutated(points: Points, rng) -> Points:
     return moved
 
 
-def search(run, reference, names, worst: Points, dtype, rng, rounds: int) -> tuple[float, list[np.ndarray]]:
+def tied(points: Points) -> Points:
+    """Isotropic: αy = αx."""
+    alpha = points["alpha"]
+    return points | {"alpha": np.stack([alpha[0], alpha[0]])}
+
+
+def search(
+    run, reference, names, worst: Points, dtype, rng, rounds: int, change=dict
+) -> tuple[float, list[np.ndarray]]:
     """Climb from the worst points found: mutate, keep the worst, again. The largest error and its input."""
     best = [worst[name] for name in names]
     keep = best[0].shape[-1]
     for _ in range(rounds):
         parents = {name: np.tile(a, 8) for name, a in zip(names, best, strict=True)}
-        children = rounded(_mutated(parents, rng), dtype)
+        children = change(rounded(_mutated(parents, rng), dtype))
         pool = [np.concatenate([a, children[name]], axis=-1) for name, a in zip(names, best, strict=True)]
         error, graded, _ = errors(run, reference, pool, dtype)
         order = np.argsort(np.where(graded, error, -1))[::-1][:keep]
@@ -202,6 +210,7 @@ def measure(
     seed: int = 0,
     rounds: int = 6,
     draws: tuple[str, ...] | None = None,
+    isotropic: bool = False,
 ) -> Accuracy:
     """Grade `function` against `reference` on `count` seeded points of a region, then search for a worse one.
 
@@ -211,9 +220,10 @@ def measure(
     kind = DTYPES[dtype]
     run, names = compiled(function), draws or arguments(function)
     chunk = min(count, 1 << 17)
+    change = tied if isotropic else dict
     every, kept, faults = [], [], Faults(0, 0, 0, 0)
     for _ in range(0, count, chunk):
-        drawn = rounded(REGIONS[region](rng, chunk), kind)
+        drawn = change(rounded(REGIONS[region](rng, chunk), kind))
         args = [drawn[name] for name in names]
         error, graded, found = errors(run, reference, args, kind)
         every.append(error[graded])
@@ -228,7 +238,7 @@ def measure(
     excess = max(0.0, float(np.nanmax(own)))
     rest = float(top_error[top][-1]) if len(error) > EXAMINED else 0.0
     seeds = {name: a[..., :64] for name, a in zip(names, args, strict=True)}
-    worst, where = search(run, reference, names, seeds, kind, rng, rounds)
+    worst, where = search(run, reference, names, seeds, kind, rng, rounds, change)
     return Accuracy(
         quantity=quantity,
         variant=variant,

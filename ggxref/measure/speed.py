@@ -1,0 +1,106 @@
+"""Time of functions side by side: interleaved runs, so that a busy machine slows them all alike; a copy as the roof.
+
+A subject is a call without arguments that returns when its result is there.
+"""
+
+import platform
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import jax
+import numpy as np
+
+from ggxref.measure.accuracy import DTYPES, arguments
+from ggxref.measure.regions import REGIONS, rounded
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Nanoseconds a point: median, quartiles and minimum of interleaved runs; compilation in seconds."""
+
+    subject: str
+    points: int
+    median: float
+    lower: float
+    upper: float
+    best: float
+    compilation: float
+    runs: int
+
+
+def machine() -> str:
+    """The processor, and what runs on it: for the caption of every figure of speed."""
+    info = Path("/proc/cpuinfo")
+    names = [line.split(":")[1].strip() for line in info.read_text().splitlines() if line.startswith("model name")]
+    count = len(names) or 1
+    return f"{count} x {names[0] if names else platform.processor()}, jax {jax.__version__}, {platform.system()}"
+
+
+def inputs(names: Iterable[str], points: int, dtype: str = "f32", *, isotropic: bool = False, seed: int = 0) -> list:
+    """Seeded typical arguments, points in the last axis, on the device."""
+    drawn = rounded(REGIONS["typical"](np.random.default_rng(seed), points), DTYPES[dtype])
+    # One material for all points, as a renderer has it.
+    drawn["alpha"] = np.asarray([0.3, 0.3 if isotropic else 0.1], DTYPES[dtype])
+    with jax.enable_x64(dtype == "f64"):
+        return [jax.device_put(drawn[name]) for name in names]
+
+
+def subject(function: Callable, args: list, dtype: str = "f32") -> tuple[Callable[[], object], float]:
+    """A jitted `function`, mapped over the last axis of all `args` but "alpha", and the seconds of its compilation."""
+    axes = tuple(None if name == "alpha" else -1 for name in arguments(function))
+    with jax.enable_x64(dtype == "f64"):
+        start = time.perf_counter()
+        program = jax.jit(jax.vmap(function, in_axes=axes, out_axes=-1)).lower(*args).compile()
+        seconds = time.perf_counter() - start
+    return lambda: jax.block_until_ready(program(*args)), seconds
+
+
+def copy(args: list) -> Callable[[], object]:
+    """A subject that copies the bytes of `args` into fresh memory with NumPy: the roof."""
+    flat = [np.array(a) for a in args]
+    return lambda: [a.copy() for a in flat]
+
+
+def interleaved(
+    subjects: dict[str, Callable[[], object]],
+    points: int,
+    *,
+    seconds: float = 2.0,
+    compilation: dict[str, float] | None = None,
+) -> list[Timing]:
+    """Run all subjects in turn, again and again, for about `seconds` in all (at least 5 rounds)."""
+    for call in subjects.values():
+        call()
+    times: dict[str, list[float]] = {name: [] for name in subjects}
+    end = time.perf_counter() + seconds
+    while time.perf_counter() < end or len(next(iter(times.values()))) < 5:
+        for name, call in subjects.items():
+            start = time.perf_counter()
+            call()
+            times[name].append((time.perf_counter() - start) / points * 1e9)
+    rows = []
+    for name, t in times.items():
+        lower, median, upper = np.quantile(t, [0.25, 0.5, 0.75])
+        compiled = (compilation or {}).get(name, 0.0)
+        rows.append(Timing(name, points, float(median), float(lower), float(upper), float(min(t)), compiled, len(t)))
+    return rows
+
+
+def throughput(
+    functions: dict[str, Callable],
+    points: int,
+    *,
+    dtype: str = "f32",
+    isotropic: bool = False,
+    seconds: float = 2.0,
+    peers: dict[str, Callable[[], object]] | None = None,
+) -> list[Timing]:
+    """Time named one-point functions of the same arguments on the same points, beside a copy and `peers`."""
+    names = arguments(next(iter(functions.values())))
+    args = inputs(names, points, dtype, isotropic=isotropic)
+    made = {name: subject(f, args, dtype) for name, f in functions.items()}
+    subjects: dict[str, Callable[[], object]] = {name: call for name, (call, _) in made.items()}
+    subjects |= {"copy": copy(args)} | (peers or {})
+    return interleaved(subjects, points, seconds=seconds, compilation={n: s for n, (_, s) in made.items()})
