@@ -3,7 +3,7 @@
 import pytest
 from flint import arb
 
-from ggxref.oracle import masking
+from ggxref.oracle import ellipsoid, masking
 from ggxref.oracle.linalg import N, apply, dot, negative, norm, normalise
 from ggxref.oracle.precision import exact, working
 
@@ -77,6 +77,14 @@ def test_sigma_splits_into_above_and_below():
 def test_the_ellipsoid_holds_ggx():
     diagonal = ((ALPHA[0], arb(0), arb(0)), (arb(0), ALPHA[1], arb(0)), exact((0, 0, 1)))
     assert same(masking.g1_ellipsoid(STEEP, STEEP, diagonal), masking.g1_ggx(STEEP, STEEP, ALPHA))
+
+
+def test_the_skewed_surface_shows_the_flat_area():
+    """walter2014 (32): the lune's projected area, whose density test_oracle_sampling proves, is shared out by G1."""
+    for w in (W, STEEP):
+        flat = ellipsoid.projected_area(N, A, arb(1)) * normalise(w)[2]
+        g1 = masking.g1_ellipsoid(w, w, A)
+        assert g1 < 1 and same(g1 * ellipsoid.lune_area(w, N, A, arb(1)), flat)
 
 
 def test_skew_needs_the_minimum():
