@@ -200,8 +200,13 @@ def brdf(theta: Array, wi: Array, wo: Array, wm: Array) -> Array:
     f0, diffuse = theta[len(SHAPE) :].reshape(2, -1)
     D = slope_density(theta, slopes.from_normal(wm)) / wm[2] ** 4
     g2 = masking.g2_height_correlated(g1(theta, wi), g1(theta, wo))
-    F = fresnel.schlick(wi[0] * wm[0] + wi[1] * wm[1] + wi[2] * wm[2], 1 / (1 + jnp.exp(-f0)))
-    return bsdf.brdf(wi, wo, D, g2, F) + jnp.exp(diffuse) / math.pi
+    cosine = wi[0] * wm[0] + wi[1] * wm[1] + wi[2] * wm[2]
+
+    def band(f0, diffuse):
+        F = fresnel.schlick(cosine, 1 / (1 + jnp.exp(-f0)))
+        return bsdf.brdf(wi, wo, D, g2, F) + jnp.exp(diffuse) / math.pi
+
+    return jax.vmap(band)(f0, diffuse)
 
 
 _brdfs = jax.jit(jax.vmap(brdf, (None, -1, -1, -1), -1))

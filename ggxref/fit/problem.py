@@ -9,7 +9,7 @@ from ggxref.errors import InputError
 from ggxref.fit import models, objectives
 from ggxref.fit.data import Heights, Reflectance
 from ggxref.fit.objectives import Objective
-from ggxref.fit.slopes import TILES, from_heights
+from ggxref.fit.slopes import TILES, Slopes, from_heights
 
 FOLDS = 8
 """At most; as many as there are incident directions where those are fewer."""
@@ -75,10 +75,15 @@ def from_reflectance(data: Reflectance, *, min_cosine: float = 0.05) -> Problem:
 
 
 def from_surface(data: Heights, *, degree: int = 1) -> Problem:
-    """The slope density's problem, over the central differences of the levelled surface."""
+    """The slope density's problem, over the central differences of the surface levelled by a polynomial."""
     surface = from_heights(data, degree=degree)
     notes = [f"{len(surface.slopes)} slopes by central differences of the surface levelled by degree {degree}"]
     notes += [f"{surface.missing} left out: a height is missing"] if surface.missing else []
+    return from_slopes(surface, tuple(notes))
+
+
+def from_slopes(surface: Slopes, notes: tuple[str, ...] = ()) -> Problem:
+    """The slope density's problem, over these slopes."""
     starts, scale = _slope_starts(surface.slopes)
     # Folds take every eighth tile, shifted from row to row, so that each holds all columns and all rows.
     row, column = np.divmod(surface.tile, TILES)
@@ -92,7 +97,7 @@ def from_surface(data: Heights, *, degree: int = 1) -> Problem:
         starts=starts,
         scale=scale,
         models=models.MODELS,
-        notes=tuple(notes),
+        notes=notes,
     )
 
 

@@ -11,6 +11,8 @@ FEWEST = 1000
 """Slopes below which neither a tail nor a standard error over tiles means anything."""
 STEEPEST = 10.0
 """A median slope beyond this, 84°, is no microsurface: the unit of the heights or of the pixel is wrong."""
+FLATTEST = 1e-9
+"""Slopes that all lie within this are the rounding of a plane; the smoothest mirrors have 1e-5."""
 TILES = 8
 """Tiles a side: the surface is cut in TILES², and neighbouring slopes stand or fall together."""
 
@@ -60,7 +62,7 @@ def from_heights(field: Heights, *, degree: int = 1) -> Slopes:
     typical = float(np.median(np.hypot(*slopes.T)))
     if typical > STEEPEST:
         raise InputError(f"{path}: a median slope of {typical:.3g}; check the unit of the heights and the pixel size")
-    if np.ptp(slopes, axis=0).min() == 0 or typical == 0:
+    if np.ptp(slopes, axis=0).min() < FLATTEST:
         raise InputError(f"{path}: a surface flat along an axis; its slopes have no density to fit")
     rows, columns = (np.arange(size) * TILES // size for size in grid.shape[:2])
     tile = rows[:, None] * TILES + columns

@@ -43,7 +43,8 @@ def parse(content: bytes, source: Source) -> Heights:
         due = nx * ny * dtype.itemsize
         if member.file_size != due:
             raise InputError(f"{path}: {link} has {member.file_size} bytes where {nx} x {ny} of {dtype} takes {due}")
-        heights = np.frombuffer(_read(archive, member, LARGEST_DATA, path), dtype).reshape(ny, nx) * scale
+        stored = np.frombuffer(_read(archive, member, LARGEST_DATA, path), dtype)
+    heights = stored.astype(np.float64).reshape(ny, nx) * scale
     return Heights(np.where(np.abs(heights) < MISSING, heights, np.nan), pixel, source)
 
 

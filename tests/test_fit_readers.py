@@ -1,0 +1,220 @@
+"""Readers give back what was written, in SI units, and refuse what is no measurement with one line that says why."""
+
+import io
+import os
+import zipfile
+
+import fit_data
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from ggxref.errors import InputError
+from ggxref.fit.data import Heights, Reflectance
+from ggxref.fit.readers import read, x3p
+
+SURFACE = fit_data.rough_surface(24)
+DEGREES = fit_data.plane_angles((30.0,))[::10]
+VALUES = 0.1 + 0.01 * np.arange(len(DEGREES))
+ROW = "30 180 -85 0 "
+
+
+def lines(*extra):
+    return fit_data.table(DEGREES, VALUES) + "".join(f"{line}\n" for line in extra)
+
+
+class TestTable:
+    def test_directions_and_values(self, tmp_path):
+        data = read(fit_data.write(tmp_path / "a.csv", fit_data.table(DEGREES, VALUES)))
+        assert isinstance(data, Reflectance)
+        # azimuth_i = 180 degrees, so that a positive zenith_o, at azimuth 0, is the mirror's side.
+        assert_allclose(data.wi, np.tile([-0.5, 0, np.sqrt(0.75)], (len(VALUES), 1)), atol=1e-15)
+        assert_allclose(data.wo[:, 0], np.sin(np.radians(DEGREES[:, 2])), rtol=1e-14)
+        assert_array_equal(data.values[:, 0], VALUES)
+        assert data.bands == ("brdf",) and data.mask.all()
+
+    @pytest.mark.parametrize("name", ["a.x3p", "a", "a.npy"])
+    def test_format_is_recognised_by_content(self, tmp_path, name):
+        assert isinstance(read(fit_data.write(tmp_path / name, fit_data.table(DEGREES, VALUES))), Reflectance)
+
+    def test_named_columns_in_any_order(self, tmp_path):
+        rows = "\n".join(
+            f"{v:.17g},{a[2]},{a[3]},{a[0]},{a[1]},{2 * v:.17g}" for a, v in zip(DEGREES, VALUES, strict=True)
+        )
+        text = "red,zenith_o,azimuth_o,zenith_i,azimuth_i,green\n" + rows
+        data = read(fit_data.write(tmp_path / "a.csv", text))
+        plain = read(fit_data.write(tmp_path / "b.csv", fit_data.table(DEGREES, VALUES)))
+        assert isinstance(data, Reflectance) and isinstance(plain, Reflectance)
+        assert data.bands == ("red", "green")
+        assert_array_equal(data.values, np.stack([VALUES, 2 * VALUES], axis=1))
+        assert_array_equal(data.wo, plain.wo)
+
+    def test_other_names_leave_the_order(self, tmp_path):
+        text = fit_data.table(DEGREES, VALUES, "# Data from X\n# phi_in theta_in phi_out theta_out brdf\n")
+        data = read(fit_data.write(tmp_path / "a.csv", text))
+        assert isinstance(data, Reflectance)
+        assert_allclose(data.wi[0], [-0.5, 0, np.sqrt(0.75)], atol=1e-15)
+
+    def test_the_horizon_is_left_out_and_counted(self, tmp_path):
+        data = read(fit_data.write(tmp_path / "a.csv", lines("30 180 90 0 0.1", "30 180 -90 0 0.1")))
+        assert isinstance(data, Reflectance)
+        assert data.excluded == {"on the horizon": 2}
+        assert data.mask.sum() == len(VALUES)
+
+    @pytest.mark.parametrize(
+        ("line", "said"),
+        [
+            (ROW + "nan", "line 20: brdf = nan; a BRDF is finite"),
+            (ROW + "inf", "line 20: brdf = inf"),
+            (ROW + "-0.1", "line 20: brdf = -0.1; a BRDF is finite and not negative"),
+            ("30 180 93.2 0 0.1", "line 20: zenith_o = 93.2 is below the horizon"),
+            ("-91 180 0 0 0.1", "line 20: zenith_i = -91 is below the horizon"),
+            ("30 180 nan 0 0.1", "line 20: zenith_o = nan"),
+            ("30 400 0 0 0.1", "line 20: azimuth_i = 400 is no azimuth in degrees"),
+            (ROW + "x", "line 20: could not convert string to float: 'x'"),
+            (ROW, "line 20: 4 columns where the rows above have 5"),
+        ],
+    )
+    def test_a_bad_line_is_named(self, tmp_path, line, said):
+        with pytest.raises(InputError, match=said) as error:
+            read(fit_data.write(tmp_path / "a.csv", lines(line)))
+        assert "\n" not in str(error.value) and str(tmp_path / "a.csv") in str(error.value)
+
+    def test_radians_are_noticed(self, tmp_path):
+        with pytest.raises(InputError, match="look like radians; need degrees"):
+            read(fit_data.write(tmp_path / "a.csv", fit_data.table(np.radians(DEGREES), VALUES)))
+
+    @pytest.mark.parametrize(
+        ("text", "said"),
+        [
+            ("", "the file is empty"),
+            ("Dear reader,\nthis is a letter and no measurement at all.\n", "no measurement known here"),
+            ("1 2 3\n" * 20, "no measurement known here"),
+            (lines()[: len(fit_data.HEADER) + 120], "rows of numbers"),
+            (fit_data.table(DEGREES, 0 * VALUES), "brdf is 0 in every row"),
+            (b"\x00\x01\x02" * 50, "no measurement known here"),
+            (fit_data.table(DEGREES, VALUES).encode() + b"\xff\xfe\n", "not UTF-8 text"),
+        ],
+    )
+    def test_no_table(self, tmp_path, text, said):
+        with pytest.raises(InputError, match=said):
+            read(fit_data.write(tmp_path / "a.csv", text))
+
+
+class TestHeights:
+    @pytest.mark.parametrize(
+        ("code", "unit", "accuracy"), [("D", 1, 0), ("F", 1, 1e-7), ("L", 1e-12, 1e-5), ("I", 1e-10, 1e-3)]
+    )
+    def test_x3p(self, tmp_path, code, unit, accuracy):
+        field = read(fit_data.write(tmp_path / "a", fit_data.x3p(SURFACE / unit, code, unit)))
+        assert isinstance(field, Heights)
+        assert field.pixel == (1e-6, 2e-6)
+        assert_allclose(field.heights, SURFACE, rtol=0, atol=accuracy * 1e-6)
+
+    def test_matrix(self, tmp_path):
+        field = read(fit_data.write(tmp_path / "a", fit_data.matrix(SURFACE * 1e9)))
+        assert isinstance(field, Heights)
+        assert field.pixel == (1e-6, 1e-6)
+        assert_allclose(field.heights, SURFACE, rtol=1e-8)
+
+    def test_npy_and_the_pixel_that_the_user_gives(self, tmp_path):
+        field = read(fit_data.write(tmp_path / "a", fit_data.npy(SURFACE)), pixel=(1e-6, 3e-6))
+        assert isinstance(field, Heights)
+        assert field.pixel == (1e-6, 3e-6)
+        assert_array_equal(field.heights, SURFACE)
+
+    def test_the_users_pixel_wins(self, tmp_path):
+        field = read(fit_data.write(tmp_path / "a", fit_data.matrix(SURFACE)), pixel=(2e-6, 2e-6))
+        assert isinstance(field, Heights) and field.pixel == (2e-6, 2e-6)
+
+    def test_missing_heights_are_nan(self, tmp_path):
+        holes = SURFACE.copy()
+        holes[3, 4], holes[5, 6], holes[7, 8] = np.nan, 1e300, -1e300
+        field = read(fit_data.write(tmp_path / "a", fit_data.x3p(holes)))
+        assert isinstance(field, Heights)
+        assert np.argwhere(np.isnan(field.heights)).tolist() == [[3, 4], [5, 6], [7, 8]]
+
+    @pytest.mark.parametrize(
+        ("content", "said"),
+        [
+            (fit_data.x3p(SURFACE)[:900], "broken or truncated zip"),
+            (fit_data.x3p(SURFACE, nx=2**40), "bytes where"),
+            (fit_data.x3p(SURFACE, nx=0), "need 3 or more a side"),
+            (fit_data.x3p(SURFACE, nx=-24), "need 3 or more a side"),
+            (fit_data.x3p(SURFACE, nz=2), "one layer"),
+            (fit_data.x3p(SURFACE, nx="many"), "need int"),
+            (fit_data.x3p(SURFACE, dx=0), "pixel size dx = 0 m"),
+            (fit_data.x3p(SURFACE, dy="nan"), "pixel size dy = nan m"),
+            (fit_data.x3p(SURFACE, dy=2), "pixel size dy = 2 m"),
+            (fit_data.x3p(SURFACE * 0, "L", 0.0), "z increment = 0"),
+            (
+                fit_data.x3p(SURFACE, main=fit_data.MAIN.replace("<CZ>", "<C>").replace("</CZ>", "</C>")),
+                "no Record1/Axes/CZ",
+            ),
+            (fit_data.x3p(SURFACE, main=fit_data.MAIN.replace("{code}", "Q")), "heights of type 'Q'"),
+            (fit_data.x3p(SURFACE, main="<a><b></a>"), "main.xml: mismatched tag"),
+            (fit_data.x3p(SURFACE, main="no xml"), "main.xml: syntax error"),
+            (fit_data.npy(SURFACE)[:-8], "bytes of data where"),
+            (fit_data.npy(SURFACE)[:40], "broken .npy header"),
+            (fit_data.npy(SURFACE.ravel()), "need two dimensions"),
+            (fit_data.npy(SURFACE.astype(complex)), "of real numbers"),
+            (fit_data.npy(np.array([[{}] * 4] * 4, dtype=object)), "of real numbers"),
+            (fit_data.matrix(SURFACE, pixel="0 m"), "pixel size dx = 0 m"),
+            (fit_data.matrix(SURFACE, pixel="-1e-6 m"), "pixel size dx = -1e-06 m"),
+            (fit_data.matrix(SURFACE, pixel="0.37 um"), "pixel size in 'um'; need m"),
+            (fit_data.matrix(SURFACE, factor="0"), "height conversion factor = 0"),
+            (fit_data.matrix(SURFACE, size="h=99999 w=99999"), "a matrix of 99999 x 99999"),
+            (fit_data.matrix(SURFACE, size="h=24 w=25"), "576 numbers where 24 x 25 = 600"),
+            (fit_data.matrix(SURFACE).replace(" 1", " one", 1), "could not convert string to float"),
+        ],
+    )
+    def test_broken_files(self, tmp_path, content, said):
+        pixel = (1e-6, 1e-6) if not isinstance(content, str) and content.startswith(b"\x93") else None
+        with pytest.raises(InputError, match=said) as error:
+            read(fit_data.write(tmp_path / "a", content), pixel=pixel)
+        assert "\n" not in str(error.value)
+
+    def test_the_pixel_size_must_be_known(self, tmp_path):
+        with pytest.raises(InputError, match="does not say its pixel size"):
+            read(fit_data.write(tmp_path / "a", fit_data.npy(SURFACE)))
+
+    def test_entities_are_refused(self, tmp_path):
+        bomb = '<!DOCTYPE a [<!ENTITY b "' + "b" * 100 + '"><!ENTITY c "' + "&b;" * 100 + '">]><a>&c;</a>'
+        with pytest.raises(InputError, match="declares a document type"):
+            read(fit_data.write(tmp_path / "a", fit_data.x3p(SURFACE, main=bomb)))
+
+    def test_a_zip_bomb_is_refused_before_it_is_unpacked(self, tmp_path, monkeypatch):
+        stream = io.BytesIO()
+        with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("main.xml", b" " * (x3p.LARGEST_XML + 1))
+
+        def unpack(*_):
+            raise AssertionError("unpacked")
+
+        monkeypatch.setattr(zipfile.ZipFile, "open", unpack)
+        with pytest.raises(InputError, match="too large to be true"):
+            read(fit_data.write(tmp_path / "a", stream.getvalue()))
+
+    def test_a_member_longer_than_it_claims_is_refused(self, tmp_path):
+        content = bytearray(fit_data.x3p(SURFACE))
+        at = content.rfind(b"bindata/data.bin") - 46  # the central directory's entry
+        claimed = int.from_bytes(content[at + 24 : at + 28], "little")
+        assert claimed == SURFACE.nbytes
+        content[at + 24 : at + 28] = (claimed - 8).to_bytes(4, "little")
+        with pytest.raises(InputError, match="bytes"):
+            read(fit_data.write(tmp_path / "a", bytes(content)))
+
+
+class TestPath:
+    def test_no_such_file(self, tmp_path):
+        with pytest.raises(InputError, match="no such file"):
+            read(tmp_path / "nothing.csv")
+
+    def test_a_directory(self, tmp_path):
+        with pytest.raises(InputError, match="not a regular file"):
+            read(tmp_path)
+
+    def test_a_pipe_does_not_block(self, tmp_path):
+        os.mkfifo(tmp_path / "pipe")
+        with pytest.raises(InputError, match="not a regular file"):
+            read(tmp_path / "pipe")

@@ -1,0 +1,247 @@
+"""Fits of synthetic measurements find the parameters that made them, know how sure they are, and choose that model."""
+
+import fit_data
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from ggxref.errors import InputError
+from ggxref.fit import models, selection, solver
+from ggxref.fit.data import Heights, Reflectance, Source, direction
+from ggxref.fit.fitting import fit, fit_models
+from ggxref.fit.problem import from_reflectance, from_slopes
+from ggxref.fit.slopes import TILES, Slopes
+from ggxref.fit.uncertainty import Curvature, spread
+
+SURE = 4.0
+"""Standard errors that a seeded estimate may be off: 6e-5 by chance where it is unbiased and its error right."""
+
+MEAN, SCATTER = {
+    "isotropic": (0.0, 0.0), "anisotropic": (0.0, 0.0), "rotated": (0.0, 0.0), "ellipsoid": (0.06, -0.04),
+}, {
+    "isotropic": [[0.04, 0], [0, 0.04]], "anisotropic": [[0.09, 0], [0, 0.01]],
+    "rotated": [[0.06, 0.03], [0.03, 0.05]], "ellipsoid": [[0.06, 0.03], [0.03, 0.05]],
+}  # fmt: skip
+
+
+def truth(model):
+    C = np.linalg.cholesky(SCATTER[model])
+    return {
+        "alpha_x": C[0, 0],
+        "alpha_y": C[1, 1],
+        "shear": C[1, 0],
+        "mean_x": MEAN[model][0],
+        "mean_y": MEAN[model][1],
+    }
+
+
+def reflectance(model, degrees, noise=0.1, seed=1):
+    """A measurement with lognormal noise."""
+    A = fit_data.shape(MEAN[model], SCATTER[model])
+    values = fit_data.brdf(degrees, A, 0.6, 0.1)
+    values = values * np.exp(noise * np.random.default_rng(seed).normal(size=len(values)))
+    zenith_i, azimuth_i, zenith_o, azimuth_o = np.radians(degrees).T
+    return Reflectance(
+        wi=direction(zenith_i, azimuth_i),
+        wo=direction(zenith_o, azimuth_o),
+        values=values[:, None],
+        weights=np.ones(len(values)),
+        mask=np.ones(len(values), bool),
+        bands=("brdf",),
+        source=Source("synthetic", "test", ""),
+    )
+
+
+def slopes(model, count=8192, seed=1):
+    """Independent slopes: a normal over the root of an exponential is the Student-t of the ellipsoid NDF."""
+    random = np.random.default_rng(seed)
+    normal = random.normal(size=(count, 2)) @ np.linalg.cholesky(SCATTER[model]).T / np.sqrt(2)
+    heavy = normal / np.sqrt(random.exponential(size=(count, 1)))
+    return Slopes(heavy + MEAN[model], np.arange(count) % TILES**2, 0)
+
+
+def assert_recovers(found, expected):
+    for name, value in expected.items():
+        error = found.errors[name]
+        assert abs(found.values[name] - value) <= SURE * error + 1e-9, (
+            f"{name}: {found.values[name]} ± {error}, not {value}"
+        )
+
+
+@pytest.fixture(scope="module", params=SCATTER)
+def model(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def ladder(model):
+    return fit(reflectance(model, fit_data.angles()))
+
+
+class TestReflectance:
+    def test_recovery(self, ladder, model):
+        found = next(fit for fit in ladder.fits if fit.model == model)
+        assert not found.trouble
+        assert_recovers(found, truth(model) | {"f0": 0.6, "diffuse": 0.1})
+
+    def test_the_noise_is_what_is_left(self, ladder, model):
+        found = next(fit for fit in ladder.fits if fit.model == model)
+        # 960 samples: the root mean square of a normal is sure to 1/sqrt(2 n), 2.3 %.
+        assert found.log_rmse == pytest.approx(0.1, rel=SURE * 0.023)
+
+    def test_the_model_that_made_it_is_chosen(self, ladder, model):
+        assert ladder.chosen == model
+
+    def test_starts_agree(self, ladder):
+        assert all(fit.agreeing[0] >= 3 for fit in ladder.fits)
+
+
+@pytest.fixture(scope="module")
+def fits(model):
+    return fit_models(from_slopes(slopes(model)), list(SCATTER), {})
+
+
+def log_loss(found, points):
+    """Mean -log density of slopes under a fit."""
+    with solver.float64():
+        return -np.mean(np.log(models.slope_densities(found.theta, points.T)))
+
+
+class TestSlopes:
+    def test_recovery(self, fits, model):
+        found = fits[list(SCATTER).index(model)]
+        assert not found.trouble
+        assert found.agreeing == (2, 2)
+        assert_recovers(found, truth(model))
+
+    def test_the_model_that_made_it_is_chosen(self, fits, model):
+        assert selection.choose([f.model for f in fits], np.stack([f.held_out for f in fits])) == model
+
+    def test_the_fold_left_out_is_as_if_fitted_without(self, fits, model):
+        """The one Newton step of `held_out` against a fit of the other folds."""
+        surface = slopes(model)
+        problem = from_slopes(surface)
+        others = problem.fold != 3
+        refitted = fit_models(from_slopes(Slopes(surface.slopes[others], surface.tile[others], 0)), [model], {})[0]
+        left_out, found = surface.slopes[~others], fits[list(SCATTER).index(model)]
+        expected, whole = log_loss(refitted, left_out), log_loss(found, left_out)
+        # Second order in the fold's pull, which is a few percent of θ: a twentieth of what leaving the fold out changes.
+        assert abs(found.held_out[3] - expected) < 0.05 * abs(expected - whole)
+
+
+class TestPlane:
+    """Directions in the plane of incidence see αx and the mean slope along x, and nothing across."""
+
+    def test_recovery(self):
+        data = reflectance("isotropic", fit_data.plane_angles())
+        ladder = fit(data)
+        assert [fit.model for fit in ladder.fits] == ["isotropic", "ellipsoid"]
+        assert ladder.chosen == "isotropic"
+        assert_recovers(ladder.best, truth("isotropic") | {"f0": 0.6, "diffuse": 0.1})
+
+    def test_a_turned_plane_is_the_same_fit(self):
+        data = reflectance("isotropic", fit_data.plane_angles())
+        cosine, sine = np.cos(0.7), np.sin(0.7)
+        turn = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
+        turned = Reflectance(
+            data.wi @ turn, data.wo @ turn, data.values, data.weights, data.mask, data.bands, data.source
+        )
+        problem, expected = from_reflectance(turned), from_reflectance(data)
+        assert_allclose(problem.samples[0], expected.samples[0], atol=1e-12)
+        assert any("azimuth 40.11°" in note for note in problem.notes)
+
+    def test_what_it_cannot_see_is_refused(self):
+        with pytest.raises(InputError, match="cannot tell it from a smaller one; need isotropic or ellipsoid"):
+            fit(reflectance("isotropic", fit_data.plane_angles()), model="anisotropic")
+
+
+class TestFixed:
+    def test_a_held_parameter_stays(self):
+        found = fit(
+            reflectance("isotropic", fit_data.angles()), model="isotropic", fixed={"alpha": 0.2, "f0": 0.6}
+        ).best
+        assert found.values["alpha_x"] == pytest.approx(0.2, rel=1e-12) and found.errors["alpha_x"] == 0
+        assert_recovers(found, {"diffuse": 0.1})
+
+    @pytest.mark.parametrize(
+        ("model", "fixed", "said"),
+        [
+            ("isotropic", {"alpha_x": 0.1, "alpha_y": 0.2}, "cannot hold these values of alpha_x, alpha_y"),
+            ("anisotropic", {"shear": 0.1}, "cannot hold these values of shear"),
+            ("auto", {"roughness": 0.1}, "no parameter 'roughness' to fix"),
+            ("auto", {"alpha": 0.0}, "alpha_x = 0; need a positive number"),
+            ("ggx", {}, "model 'ggx'; need auto or one of isotropic"),
+        ],
+    )
+    def test_what_cannot_be_held(self, model, fixed, said):
+        with pytest.raises(InputError, match=said):
+            fit(reflectance("isotropic", fit_data.angles()), model=model, fixed=fixed)
+
+
+class TestTrouble:
+    def test_a_diffuse_surface_does_not_tell_alpha(self):
+        """All of f is the diffuse term: the lobe's own parameters are a valley, and that is said."""
+        data = reflectance("isotropic", fit_data.angles())
+        flat = Reflectance(
+            data.wi, data.wo, np.full_like(data.values, 0.1), data.weights, data.mask, data.bands, data.source
+        )
+        assert fit(flat, model="anisotropic").best.trouble
+
+    def test_too_few_samples(self):
+        data = reflectance("isotropic", fit_data.angles()[:20])
+        with pytest.raises(InputError, match="need at least 32"):
+            fit(data)
+
+    @pytest.mark.parametrize(
+        ("option", "value"), [("min_cosine", 1.0), ("min_cosine", -0.1), ("degree", -1), ("degree", 9)]
+    )
+    def test_options_out_of_range(self, option, value):
+        heights = Heights(fit_data.rough_surface(), (1e-6, 1e-6), Source("surface", "test", ""))
+        with pytest.raises(InputError, match="need"):
+            fit(heights, **{option: value})
+
+
+class TestSpread:
+    def test_least_squares_of_a_line(self):
+        """For a straight line with independent noise the sandwich is the textbook's covariance."""
+        random = np.random.default_rng(3)
+        x = np.linspace(-1, 1, 4000)
+        design = np.stack([np.ones_like(x), x], axis=1)
+        residual = 0.3 * random.normal(size=len(x))
+        scores = -design * residual[:, None]
+        at = Curvature(design.T @ design, scores - scores.mean(axis=0))
+        expected = 0.3**2 * np.linalg.inv(design.T @ design)
+        # 4000 squares of normals are sure to sqrt(2/4000), 2.2 %.
+        assert_allclose(spread(at, np.eye(2)).covariance, expected, atol=SURE * 0.022 * expected.max())
+
+    def test_blocks_that_move_together_widen_it(self):
+        scores = np.random.default_rng(4).normal(size=(500, 1))
+        one = spread(Curvature(np.eye(1), scores), np.eye(1)).covariance
+        together = spread(Curvature(np.eye(1), 4 * scores), np.eye(1)).covariance
+        assert_allclose(together, 16 * one)
+
+    def test_a_valley_is_no_point(self):
+        flat = Curvature(np.diag([1.0, 0.0]), np.random.default_rng(5).normal(size=(50, 2)))
+        assert not spread(flat, np.eye(2)).point
+
+    def test_a_gradient_left_over_shows(self):
+        scores = np.random.default_rng(6).normal(size=(50, 1))
+        assert spread(Curvature(np.eye(1) * 50, scores - scores.mean()), np.eye(1)).newton < 1e-9
+        assert spread(Curvature(np.eye(1) * 50, scores + 1), np.eye(1)).newton > 1
+
+
+class TestChoose:
+    def test_the_smallest_within_one_standard_error(self):
+        best = np.array([1.0, 2.0, 3.0, 4.0])
+        near, far = best + np.array([0.2, -0.1, 0.1, -0.1]), best + 0.1
+        assert selection.choose(["small", "large"], np.stack([near, best])) == "small"
+        # Folds that all say the same are sure, however much they differ from one another.
+        assert selection.choose(["small", "large"], np.stack([far, best])) == "large"
+
+
+def test_lanes_are_filled_up_and_cut():
+    """More lanes than a call takes, and not a multiple of it: the answers come back in order."""
+    data = from_slopes(slopes("anisotropic"))
+    fits = fit_models(data, ["isotropic", "anisotropic"] * 3, {})
+    assert len(fits) * len(data.starts) % solver.LANES
+    assert [f.loss for f in fits[::2]] == [fits[0].loss] * 3 and [f.loss for f in fits[1::2]] == [fits[1].loss] * 3
