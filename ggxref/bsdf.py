@@ -33,7 +33,10 @@ def btdf(wi: Vec3, wo: Vec3, n_i: Real, n_o: Real, D: Real, G2: Real, F: Real) -
     heitz2014 §2.1.
     """
     wm = geometry.half_refraction(wi, wo, n_i, n_o)
-    transmitted = jnp.abs(stable.dot(wi, wm)) * jacobian.refraction(wi, wo, wm, n_i, n_o) * (1 - F) * G2 * D
+    spread = jacobian.refraction(wi, wo, wm, n_i, n_o)
+    straight = jnp.isinf(spread)  # no half vector: 0 times infinity
+    transmitted = jnp.abs(stable.dot(wi, wm)) * jnp.where(straight, 1, spread) * (1 - F) * G2 * D
+    transmitted = jnp.where(straight, jnp.inf, transmitted)
     return _over(transmitted, jnp.abs(wi[2]) * jnp.abs(wo[2]))
 
 

@@ -19,10 +19,14 @@ def times(A: Mat3, x: Real, y: Real, z: Real) -> tuple[Scalar, Scalar, Scalar]:
 
 
 def cofactor(A: Mat3) -> tuple[Mat3, Scalar]:
-    r"""The cofactor matrix $\det(A)\,A^{-T}$ and $\det A$, without a division: (3, 3) and ()."""
+    r"""The cofactor matrix $\det(A)\,A^{-T}$ and $\det A$, without a division: (3, 3) and ().
+
+    The rows of a smooth or skewed `A` are nearly parallel: plain minors would lose the digits that they share, once each,
+    and the determinant twice.
+    """
     a, b, c = A
-    rows = jnp.stack([jnp.cross(b, c), jnp.cross(c, a), jnp.cross(a, b)])
-    return rows, a[0] * rows[0, 0] + a[1] * rows[0, 1] + a[2] * rows[0, 2]
+    rows = jnp.stack([jnp.stack(stable.cross(*pair)) for pair in ((b, c), (c, a), (a, b))])
+    return rows, stable.dot(a, rows[0])
 
 
 def length(x: Real, y: Real, z: Real) -> Scalar:
@@ -58,14 +62,16 @@ def canonical(A: Mat3) -> Mat3:
     """
     a1, a2, a3 = A.T
     a3_square = a3[0] * a3[0] + a3[1] * a3[1] + a3[2] * a3[2]
-    a1_a3, a2_a3 = stable.dot(a1, a3), stable.dot(a2, a3)
-    # In units of |a3|: the parts of a1 and a2 perpendicular to a3 have lengths |a1 x a3| / |a3|^2 and so on.
-    n1, n2 = jnp.cross(a1, a3), jnp.cross(a2, a3)
-    c00 = length(*n1) / a3_square
-    c10 = stable.dot(n1, n2) / (length(*n1) * a3_square)
-    c11 = jnp.abs(cofactor(A)[1]) / (length(*n1) * jnp.sqrt(a3_square))
+    e = stable.dot(a1, a3) / a3_square, stable.dot(a2, a3) / a3_square
+    # The parts of a1 and a2 perpendicular to a3 have the lengths |a1 x a3| / |a3| and so on, and these cross products
+    # are cofactors.
+    cof, det = cofactor(A)
+    n1, n2 = -cof[:, 1], cof[:, 0]
+    n1_length = length(*n1)
+    c00 = n1_length / a3_square
+    c10 = stable.dot(n1, n2) / (n1_length * a3_square)
+    c11 = jnp.abs(det) / (n1_length * jnp.sqrt(a3_square))
     zero, one = jnp.zeros_like(c00), jnp.ones_like(c00)
-    e = a1_a3 / a3_square, a2_a3 / a3_square
     return jnp.stack([jnp.stack([c00, c10, zero]), jnp.stack([zero, c11, zero]), jnp.stack([*e, one])])
 
 
@@ -133,7 +139,7 @@ def lune_sum(u: Vec3, v: Vec3, A: Mat3) -> Scalar:
     au, av = times(A, *u), times(A, *v)
     product = length(*au) * length(*av)
     cosine = au[0] * av[0] + au[1] * av[1] + au[2] * av[2]
-    cross = times(cofactor(A)[0], *jnp.cross(u, v))
+    cross = times(cofactor(A)[0], *stable.cross(u, v))
     square = cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]
     obtuse = cosine < 0
     # The inner `where` keeps the branch not taken away from 0/0 at u = v.

@@ -44,13 +44,20 @@ def conductor(cos_i: Real, eta: Real, k: Real) -> Scalar:
     c = jnp.abs(jnp.asarray(cos_i))
     sin_square = jnp.maximum((1 - c) * (1 + c), 0)
     # (a + ib)² = (η + ik)² − sin²θ; the smaller of a, b comes from the product ab = ηk, as its difference cancels.
-    real, imaginary = (eta - k) * (eta + k) - sin_square, eta * k
+    gap = (eta - 1) * (eta + 1) - k * k
+    real, imaginary = gap + c * c, eta * k
     modulus = jnp.sqrt(real * real + 4 * imaginary * imaginary)
     large = stable.sqrt((modulus + jnp.abs(real)) / 2)
     small = imaginary / jnp.where(large > 0, large, 1)
     a, b = jnp.where(real >= 0, large, small), jnp.where(real >= 0, small, large)
+    total = a + c
+    solid = total > 0
+    # a − c cancels as the index goes to 1; a² − c² = gap + b² does not.
+    faint = solid & (jnp.abs(gap) + b * b < c * total)
+    difference = jnp.where(faint, (gap + b * b) / jnp.where(solid, total, 1), a - c)
     # Each numerator and denominator as a sum of squares.
-    s = ((a - c) ** 2 + b * b) / ((a + c) ** 2 + b * b)
+    s_plus = total * total + b * b
+    s = jnp.where(s_plus > 0, (difference * difference + b * b) / jnp.where(s_plus > 0, s_plus, 1), 0)
     p_minus = (a * c - sin_square) ** 2 + (b * c) ** 2
     p_plus = (a * c + sin_square) ** 2 + (b * c) ** 2
     p = jnp.where(p_plus > 0, p_minus / jnp.where(p_plus > 0, p_plus, 1), 1)

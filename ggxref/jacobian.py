@@ -4,6 +4,7 @@ import jax.numpy as jnp
 
 from ggxref import stable
 from ggxref._types import Mat3, Real, Scalar, Vec3
+from ggxref.ellipsoid import cofactor, length, times
 
 
 def reflection(wo: Vec3, wm: Vec3) -> Scalar:
@@ -23,8 +24,12 @@ def refraction(wi: Vec3, wo: Vec3, wm: Vec3, n_i: Real, n_o: Real) -> Scalar:
 
     heitz2014 §2.2 (printed as ∂ω_ht/∂ω_i; the variable is the generated direction ω_o).
     """
-    o = stable.dot(wo, wm)
-    return n_o**2 * jnp.abs(o) / (n_i * stable.dot(wi, wm) + n_o * o) ** 2
+    i, o = stable.dot(wi, wm), stable.dot(wo, wm)
+    # A plain sum may be contracted to an FMA, which is not 0 where the two terms are opposite.
+    n = jnp.asarray(n_i, wi.dtype), jnp.asarray(n_o, wi.dtype)
+    path = stable.dot(n, (i, o))
+    straight = path == 0
+    return jnp.where(straight, jnp.inf, n_o**2 * jnp.abs(o) / jnp.where(straight, 1, path) ** 2)
 
 
 def slope(wm: Vec3) -> Scalar:
@@ -44,9 +49,5 @@ def linear(wm: Vec3, M: Mat3) -> Scalar:
 
     dupuy2023 (1), tokuyoshi2024 (which leaves out the vector that the determinant's power divides).
     """
-    (a, b, c), (d, e, f), (g, h, i) = M
-    x, y, z = wm
-    det = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
-    p, q, r = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
-    square = p * p + q * q + r * r
-    return jnp.abs(det) / (square * jnp.sqrt(square))
+    image = length(*times(M, *wm))
+    return jnp.abs(cofactor(M)[1]) / (image * image * image)

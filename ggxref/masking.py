@@ -107,4 +107,6 @@ def g2_v_cavity(wi: Vec3, wo: Vec3, wm: Vec3) -> Scalar:
     heitz2014 §2.1.
     """
     g1_i, g1_o = g1_v_cavity(wi, wm), g1_v_cavity(wo, wm)
-    return jnp.where(wo[2] > 0, jnp.minimum(g1_i, g1_o), jnp.maximum(g1_i + g1_o - 1, 0))
+    low, high = jnp.minimum(g1_i, g1_o), jnp.maximum(g1_i, g1_o)
+    # high - 1 is exact where the result is not 0; low + high would round away the digits of a small `low`.
+    return jnp.where(wo[2] > 0, low, jnp.maximum(low + (high - 1), 0))

@@ -41,7 +41,9 @@ def beckmann(wm: Vec3, alpha: Vec2) -> Scalar:
     # z⁴ would underflow to 0/0 towards the horizon; D has underflowed to 0 long before (α < 1e4).
     seen = (wm[2] > 0) & (z_square > math.sqrt(float(jnp.finfo(wm.dtype).tiny)) * 2)
     z_square = jnp.where(seen, z_square, 1)
-    D = jnp.exp(-_stretched(wm, alpha) / z_square) / (math.pi * alpha[0] * z_square * (alpha[1] * z_square))
+    # Half the exponent twice: the peak 1/(π αx αy) reaches into tails where the exponential alone has underflowed.
+    half = jnp.exp(-_stretched(wm, alpha) / (2 * z_square))
+    D = half * (half / (math.pi * alpha[0] * z_square * (alpha[1] * z_square)))
     return jnp.where(seen, D, 0)
 
 

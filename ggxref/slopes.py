@@ -46,7 +46,9 @@ def ggx(slope: Vec2, alpha: Vec2) -> Scalar:
 
 def beckmann(slope: Vec2, alpha: Vec2) -> Scalar:
     r"""$P^{22} = \exp(-\tilde x^2/\alpha_x^2 - \tilde y^2/\alpha_y^2) / (\pi\alpha_x\alpha_y)$. heitz2014 §5."""
-    return jnp.exp(-_stretched_square(slope, alpha)) / (math.pi * alpha[0] * alpha[1])
+    # Half the exponent twice: the peak 1/(π αx αy) reaches into tails where the exponential alone has underflowed.
+    half = jnp.exp(-_stretched_square(slope, alpha) / 2)
+    return half * (half / (math.pi * alpha[0] * alpha[1]))
 
 
 def student_t(slope: Vec2, alpha: Vec2, gamma: Real) -> Scalar:

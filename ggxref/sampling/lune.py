@@ -107,20 +107,22 @@ def sample_rejection_sphere(u: Tries, wi: Vec3, A: Mat3) -> tuple[Vec3, Int[Arra
 
     walter2014 §4, version 1.
     """
-    wide = A.astype(jnp.promote_types(A.dtype, jnp.float32))  # no half-precision singular values
-    radius = 1 / jnp.linalg.svd(wide, compute_uv=False)[-1].astype(A.dtype)
+    cof, det = cofactor(A)
+    # The longest half axis: the largest singular value of A^{-T}, which has more digits than the smallest of A.
+    wide = (cof / det).astype(jnp.promote_types(A.dtype, jnp.float32))  # no half-precision singular values
+    radius = jnp.linalg.svd(wide, compute_uv=False)[0].astype(A.dtype)
     t, b, _ = basis(wi)
-    a = times(A, *wi)
+    a = jnp.stack(times(A, *wi))
     a_square = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
 
     def attempt(u):
         x, y = _disk(u)
-        q = times(A, *(radius * (x * t + y * b)))
-        projection = a[0] * q[0] + a[1] * q[1] + a[2] * q[2]
-        miss = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] - 1
-        discriminant = projection * projection - a_square * miss
-        along = (stable.sqrt(discriminant) - projection) / a_square
-        m = jnp.stack(stable.unit(*times(A.T, q[0] + along * a[0], q[1] + along * a[1], q[2] + along * a[2])))
-        return (discriminant >= 0) & (m[2] > 0), m
+        # The ray hits the sphere-space sphere at q + sqrt(1 - q²) a/|a|, where q, its point nearest to the centre, is
+        # (a × A d) × a / a² for any point d of the ray. a × A d = cof(A) (ωi × d) leaves out the long way along a.
+        moment = jnp.stack(times(cof, *(radius * (x * b - y * t))))
+        miss = (moment[0] * moment[0] + moment[1] * moment[1] + moment[2] * moment[2]) / a_square
+        p = (jnp.cross(moment, a) / jnp.sqrt(a_square) + stable.sqrt(1 - miss) * a) / jnp.sqrt(a_square)
+        m = jnp.stack(stable.unit(*times(A.T, *p)))
+        return (miss <= 1) & (m[2] > 0), m
 
     return _first(*jax.vmap(attempt)(u))
