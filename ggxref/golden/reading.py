@@ -32,7 +32,10 @@ SHAPES |= dict.fromkeys(("alpha", "u", "mean", "slope"), (2,))
 
 @dataclass(frozen=True)
 class Test:
-    """One test: bits of inputs and result, nested as the function takes and returns them."""
+    """One test: bits of inputs and result, nested as the function takes and returns them.
+
+    `flushed` is the result for inputs whose subnormals are taken for zeros.
+    """
 
     function: Function
     fmt: Format
@@ -42,7 +45,9 @@ class Test:
     exact: Any
     expected: Any
     condition: float
+    spread: float
     ulp: int
+    flushed: Any
 
 
 def need(condition: object, message: str) -> None:
@@ -102,6 +107,12 @@ def words(value: Any, fmt: Format, where: str) -> Any:
         raise InputError(f"{where}: {error}") from None
 
 
+def positive(record: dict[str, Any], key: str, where: str) -> float:
+    value = entry(record, key, (int, float), where)
+    need(value >= 0 and math.isfinite(value), f"{where}: {key!r} wants a number >= 0, got {value}")
+    return value
+
+
 def test(record: Any, function: Function, fmt: Format, flags: dict[str, str], where: str) -> Test:
     """A test from its JSON."""
     need(isinstance(record, dict), f"{where}: wanted a JSON object, got {kind(record)}")
@@ -114,9 +125,11 @@ def test(record: Any, function: Function, fmt: Format, flags: dict[str, str], wh
     named = entry(record, "flags", list, where)
     for flag in named:
         need(isinstance(flag, str) and flag in flags, f"{where}: flag {flag!r} is not in the file's list")
-    ulp, condition = entry(record, "ulp", int, where), entry(record, "condition", (int, float), where)
+    ulp = entry(record, "ulp", int, where)
     need(ulp >= 0, f"{where}: 'ulp' wants a number >= 0, got {ulp}")
-    need(condition >= 0 and math.isfinite(condition), f"{where}: 'condition' wants a number >= 0, got {condition}")
+    condition, spread = (positive(record, key, where) for key in ("condition", "spread"))
+    expected = words(entry(record, "expected", (str, list), where), fmt, f"{where}, expected")
+    flushed = words(record["flushed"], fmt, f"{where}, flushed") if "flushed" in record else expected
     return Test(
         function,
         fmt,
@@ -124,9 +137,11 @@ def test(record: Any, function: Function, fmt: Format, flags: dict[str, str], wh
         tuple(named),
         {a: words(x, fmt, f"{where}, {a}") for a, x in inputs.items()},
         entry(record, "exact", (str, list), where),
-        words(entry(record, "expected", (str, list), where), fmt, f"{where}, expected"),
+        expected,
         condition,
+        spread,
         ulp,
+        flushed,
     )
 
 

@@ -1,16 +1,18 @@
 """One test: the exact result of a case from the oracle, with every rounding proven."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 from flint import arb
 
-from ggxref.golden.budget import allowance, condition
+from ggxref.golden.budget import allowance, sensitivity
 from ggxref.golden.cases import Case, leaves, mapped
 from ggxref.golden.catalogue import Function
-from ggxref.golden.flags import flags_of
-from ggxref.golden.rounding import DIGITS, Format, Undecided, decimal_ball, ends, round_ball, to_hex
+from ggxref.golden.flags import flags_of, is_subnormal
+from ggxref.golden.rounding import DIGITS, F16, Format, Undecided, decimal_ball, ends, round_ball, to_hex
+from ggxref.golden.steady import steady
 from ggxref.golden.stressed import Stressed
 from ggxref.oracle.precision import MAX_BITS, evaluate, working
 
@@ -60,24 +62,43 @@ def values_of(result: Any) -> tuple[Fraction | None, ...]:
     return tuple(None if is_infinite(ball) else sum(ends(ball), Fraction(0)) / 2 for ball in leaves(result))
 
 
+def flushed(case: Case) -> Exact | None:
+    """The result where the hardware takes subnormal inputs for zeros; None if there are none."""
+    # float16 is never flushed: its subnormals are part of its use.
+    if case.fmt is F16 or not any(is_subnormal(x, case.fmt) for x in leaves(case.values)):
+        return None
+    zeros = mapped_values(lambda x: Fraction(0) if is_subnormal(x, case.fmt) else x, case.values)
+    return proven(case.function, zeros, case.fmt)
+
+
 def test(case: Case) -> dict[str, Any] | None:
     """The test's record but for its id; None where it has no proven or no useful result."""
     fmt = case.fmt
     try:
-        exact = proven(case.function, case.values, fmt)
-        kappa = condition(case)
+        exact, other = proven(case.function, case.values, fmt), flushed(case)
+        found = sensitivity(case)
+        ulp = allowance(case, found.condition)
+        if found.condition and ulp > 1 << (fmt.precision - 2):
+            # The inputs' own rounding moves the result by a quarter of itself: nothing is tested.
+            return None
+        if not steady(case, ulp):
+            return None
     except (ArithmeticError, ValueError):
         # A result exactly on a decision (a tie, a jump), beyond every dtype, or outside the function's domain.
         return None
-    ulp = allowance(case, kappa)
-    if ulp > 1 << (fmt.precision - 2) and kappa:
-        # Half an ulp of the input moves the result by a quarter of itself: nothing is tested.
-        return None
-    return {
+    record = {
         "flags": flags_of(Stressed(case, exact.values)),
-        "inputs": {a: mapped(lambda b: to_hex(b, fmt), bits) for a, bits in case.bits.items()},
+        "inputs": mapped_values(lambda b: to_hex(b, fmt), case.bits),
         "exact": exact.digits,
         "expected": mapped(lambda b: to_hex(b, fmt), exact.expected),
-        "condition": float(kappa),
+        "condition": float(found.condition),
+        "spread": float(found.spread),
         "ulp": ulp,
     }
+    if other and other.expected != exact.expected:
+        record["flushed"] = mapped(lambda b: to_hex(b, fmt), other.expected)
+    return record
+
+
+def mapped_values(f: Callable[[Any], Any], inputs: dict[str, Any]) -> dict[str, Any]:
+    return {argument: mapped(f, x) for argument, x in inputs.items()}
