@@ -67,7 +67,8 @@ def student_t(wm: Vec3, alpha: Vec2, gamma: Real) -> Scalar:
         2 * jnp.log(jnp.where(above, wm[2], 1)) - jnp.log(z_square + rho / g),
     )
     q = z_square + rho / g
-    D = jnp.exp((gamma - 2) * logarithm) / (math.pi * (alpha[0] * q) * (alpha[1] * q))
+    half = jnp.exp((gamma / 2 - 1) * logarithm)  # twice, as in `beckmann`
+    D = half * (half / (math.pi * (alpha[0] * q) * (alpha[1] * q)))
     return jnp.where(above, D, 0)
 
 

@@ -59,7 +59,8 @@ def student_t(slope: Vec2, alpha: Vec2, gamma: Real) -> Scalar:
     Ribardière et al. 2017.
     """
     r = _stretched_square(slope, alpha)
-    return jnp.exp(-gamma * jnp.log1p(r / (gamma - 1))) / (math.pi * alpha[0] * alpha[1])
+    half = jnp.exp(-gamma / 2 * jnp.log1p(r / (gamma - 1)))  # twice, as in `beckmann`
+    return half * (half / (math.pi * alpha[0] * alpha[1]))
 
 
 def ellipsoid(slope: Vec2, A: Mat3) -> Scalar:

@@ -75,6 +75,12 @@ def excess(w: Vec3) -> Scalar:
     return dot((*w, one), (*w, -one)) / 2
 
 
+def log1p(x: Scalar) -> Scalar:
+    """`log(1 + x)`. XLA's own, in float64, is 129 ULP off on (−0.42, −0.29), where `1 + x` has digits enough."""
+    far = x < -0.29
+    return jnp.where(far, jnp.log(1 + jnp.where(far, x, 0)), jnp.log1p(jnp.where(far, 0, x)))
+
+
 @jax.custom_jvp
 def sqrt(x: Real) -> Scalar:
     """Square root with derivative 0, not infinity, at `x <= 0`; 0 for negative `x`, which only rounding may make."""

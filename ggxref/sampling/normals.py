@@ -27,7 +27,7 @@ def sample_beckmann(u: Vec2, alpha: Vec2) -> Vec3:
     heitz2014 algorithm 1 (Walter et al. 2007 (28)).
     """
     cos_phi, sin_phi = stable.cos_sin_turn(u[0])
-    r = stable.sqrt(-jnp.log1p(-u[1]))
+    r = stable.sqrt(-stable.log1p(-u[1]))
     return unstretch(r * cos_phi, r * sin_phi, jnp.ones_like(r), alpha)
 
 
