@@ -32,3 +32,11 @@ def test_an_open_right_hand_side_widens_the_enclosure():
 def test_without_any_proof_the_bracket_is_what_is_left():
     enclosure = cube_root(arb(2, 100), 64)
     assert enclosure.contains(arb(0)) and enclosure.contains(arb(2))
+
+
+@pytest.mark.parametrize("x", [2, 0.5])
+def test_the_enclosure_is_proven_though_the_way_to_it_failed(x):
+    """With a slope that is far too steep the search stops where it starts, below or above the root."""
+    with working(128):
+        enclosure = increasing_root(lambda t: t * t * t - arb(x), lambda t: arb(2) ** 500, arb(0), arb(2))
+        assert enclosure.contains(arb(x).root(3)) and enclosure.rad() > arb(1) / 100
