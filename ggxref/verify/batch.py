@@ -65,6 +65,12 @@ def _compiled(function, policy):
     return jax.jit(jax.vmap(partial(function, **dict(policy)))), Lock()
 
 
+def forget() -> None:
+    """Drop the compiled functions, which know nothing of a formula that was replaced since."""
+    _compiled.cache_clear()
+    _area_ratio.cache_clear()
+
+
 def _padded(mapped, block):
     rows = len(block[0])
     filled = [np.concatenate([a, np.broadcast_to(a[:1], (ROWS - rows, *a.shape[1:]))]) for a in block]

@@ -8,7 +8,7 @@ from ggxref.verify.charts import unit
 ALPHAS = np.array([[1e-4, 1e-4], [0.01, 0.01], [0.05, 0.4], [0.5, 0.1], [0.8, 0.8], [1.0, 1.0], [2.0, 0.7]])
 
 
-def direction(degrees: float, azimuth: float = 0.7) -> np.ndarray:
+def direction(degrees: float | int, azimuth: float | int = 0.7) -> np.ndarray:
     theta = np.radians(degrees)
     return np.array([np.sin(theta) * np.cos(azimuth), np.sin(theta) * np.sin(azimuth), np.cos(theta)])
 
@@ -18,7 +18,7 @@ BELOW = np.array([direction(95), direction(120, 3.0)])
 ALL = np.concatenate([UP, BELOW])
 
 
-def rotation(axis: int, angle: float) -> np.ndarray:
+def rotation(axis: int, angle: float | int) -> np.ndarray:
     i, j = [(1, 2), (2, 0), (0, 1)][axis]
     R = np.eye(3)
     R[i, i] = R[j, j] = np.cos(angle)

@@ -12,7 +12,7 @@ import numpy as np
 NORMAL = np.array([0.0, 0.0, 1.0])
 
 
-def gauss(edges: Sequence[float], n: int) -> tuple[np.ndarray, np.ndarray]:
+def gauss(edges: Sequence, n: int) -> tuple[np.ndarray, np.ndarray]:
     """Gauss–Legendre nodes and weights, `n` on each interval between neighbouring edges."""
     x, w = np.polynomial.legendre.leggauss(n)
     low, high = np.array(edges[:-1])[:, None], np.array(edges[1:])[:, None]
@@ -29,11 +29,11 @@ def unit(v: np.ndarray) -> np.ndarray:
     return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
-def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def dot(a, b):
     return np.sum(a * b, axis=-1)
 
 
-def front(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def front(a, b):
     """The clamped product ⟨a, b⟩."""
     return np.maximum(dot(a, b), 0)
 
@@ -54,7 +54,7 @@ def frame(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, float]:
     return np.stack([np.cross(e2, e3), e2, e3]), float(np.arctan2(sin, e3 @ other))
 
 
-def lune(u: np.ndarray, v: np.ndarray, A: np.ndarray, n: int = 24, breaks: Sequence[float] = ()):
+def lune(u: np.ndarray, v: np.ndarray, A: np.ndarray, n: int = 24, breaks: Sequence = ()):
     """Micronormals with m·u > 0 and m·v > 0, by longitude and latitude of A⁻ᵀm about the lune's two corners.
 
     GGX and ellipsoid densities are polynomials of sines there, whatever their shape. `breaks` are longitudes, counted
@@ -99,7 +99,7 @@ def cotangent(wi: np.ndarray, alpha) -> float:
     return float(wi[2] / flat) if flat > 0 else np.inf
 
 
-def gaussian(wi: np.ndarray, alpha, n: int = 48, breaks: Sequence[float] = ()):
+def gaussian(wi: np.ndarray, alpha, n: int = 48, breaks: Sequence = ()):
     """Micronormals that `wi` sees, by slope, for densities that fall off as Beckmann's: nodes (N, 3), weights (N,)."""
     top = min(cotangent(wi, alpha), _GAUSSIAN_REACH)
     bottom = min(-_GAUSSIAN_REACH, top - _GAUSSIAN_REACH)

@@ -23,6 +23,7 @@ CHECKS = (
     "dupuy2023",
     "tokuyoshi2024",
     "ours",
+    "misprints",
 )
 METHODS = ("exact", "certified", "quadrature", "autodiff", "monte_carlo")
 SAMPLES = 1 << 16
@@ -128,7 +129,7 @@ def check(
     method: str,
     functions: str | Callable | Sequence,
     *,
-    tolerance: float,
+    tolerance: float | int,
     mutant: tuple[str, Callable],
     **settings,
 ):
@@ -144,7 +145,7 @@ def check(
 
     def register(body):
         _register.append(
-            Check(paper, equation, statement, method, names, tolerance, mutant[0], mutant[1], body, settings)
+            Check(paper, equation, statement, method, names, float(tolerance), mutant[0], mutant[1], body, settings)
         )
         return body
 

@@ -33,7 +33,7 @@ def erratum(
     method: str,
     functions: str | Callable | Sequence,
     *,
-    tolerance: float,
+    tolerance: float | int,
     change: Callable,
     origin: str = "print",
     **settings,

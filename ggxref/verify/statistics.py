@@ -33,7 +33,7 @@ def unlikeliness(probabilities) -> float:
     p = np.asarray(probabilities, float)
     if not np.all(np.isfinite(p)):
         return np.inf
-    return float(-np.log10(max(_SMALLEST, min(1.0, p.min() * p.size))))
+    return float(-np.log10(max(_SMALLEST, p.min() * p.size))) if p.min() * p.size < 1 else 0.0
 
 
 def uniform_square(v: np.ndarray) -> float:
