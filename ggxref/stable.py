@@ -60,7 +60,10 @@ def dot(a: Vec3 | tuple[Scalar, ...], b: Vec3 | tuple[Scalar, ...]) -> Scalar:
 @dot.defjvp
 def _dot_jvp(primals, tangents):
     (a, b), (da, db) = primals, tangents
-    return dot(a, b), sum(x * dy + dx * y for x, dx, y, dy in zip(a, da, b, db, strict=True))
+    change, *terms = (x * dy + dx * y for x, dx, y, dy in zip(a, da, b, db, strict=True))
+    for term in terms:
+        change = change + term
+    return dot(a, b), change
 
 
 def cross(a: Vec3, b: Vec3) -> tuple[Scalar, Scalar, Scalar]:
