@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from ggxref.measure.tables import Rows
 from ggxref.measure.variants import QUANTITIES
 
-STYLE = {
+STYLE: dict = {
     "font.size": 8,
     "axes.titlesize": 8,
     "axes.labelsize": 8,
@@ -32,7 +32,7 @@ def _unique(rows: Rows, key: str) -> list:
     return list(dict.fromkeys(r[key] for r in rows))
 
 
-def _log_text(value: float) -> str:
+def _log_text(value) -> str:
     if not np.isfinite(value):
         return "NaN"
     return f"{value:.2g}" if value < 100 else f"{value:.0e}".replace("e+0", "e")
@@ -62,7 +62,7 @@ def accuracy(rows: Rows, caption: str) -> Figure:
 
 def speed(rows: Rows, caption: str) -> Figure:
     """Time a point against the number of points."""
-    figure, ax = plt.subplots(figsize=(5.4, 3.8), layout="constrained")
+    figure, ax = plt.subplots(figsize=(6.6, 3.8), layout="constrained")
     for k, name in enumerate(_unique(rows, "subject")):
         mine = sorted((r for r in rows if r["subject"] == name), key=lambda r: r["points"])
         x, y = [r["points"] for r in mine], [r["median"] for r in mine]
@@ -82,7 +82,6 @@ def speed(rows: Rows, caption: str) -> Figure:
             elinewidth=0.6,
         )
     ax.set(xscale="log", yscale="log", xlabel="points in a call", ylabel="time a point [ns]")
-    ax.xaxis.set_major_locator(matplotlib.ticker.LogLocator(base=2, numticks=20))
     ax.set_xscale("log", base=2)
     ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), frameon=False)
     ax.grid(True, which="major", lw=0.3, color="0.8")
@@ -142,8 +141,8 @@ def _map(ax, rows, key, limits, labels):
     for i, j in zip(*np.nonzero(fault > 0), strict=True):
         ax.plot(j, i, "x", color="black", ms=2.5, mew=0.6)
     for axis, values in ((ax.xaxis, first), (ax.yaxis, second)):
-        ticks = np.unique(np.linspace(0, len(values) - 1, 5).astype(int))
-        axis.set_ticks(ticks, [f"{values[t]:.3g}" for t in ticks])
+        ticks = np.unique(np.linspace(0, len(values) - 1, 4).astype(int))
+        axis.set_ticks(ticks, [f"{values[t]:.2g}" if values[t] < 80 else f"{values[t]:g}"[:6] for t in ticks])
     ax.set(xlabel=labels[0], ylabel=labels[1])
     return image
 
@@ -155,35 +154,38 @@ PLANES = {
 }
 
 
-def _panels(rows: Rows, keys: tuple[str, ...], columns: int, key: str, limits, label: str, caption: str) -> Figure:
-    groups = list(dict.fromkeys(tuple(r[k] for k in keys) for r in rows))
-    lines = -(-len(groups) // columns)
-    figure, axes = plt.subplots(lines, columns, figsize=(2.3 * columns, 2.0 * lines + 0.6), layout="constrained")
-    image = None
-    for ax, group in zip(axes.flat, groups, strict=False):
-        mine = [r for r in rows if tuple(r[k] for k in keys) == group]
-        plane = mine[0].get("plane", "alpha-theta")
-        image = _map(ax, mine, key, limits, PLANES[plane])
-        ax.set_title(": ".join(str(g).replace("_", " ") for g in group[:2]), fontsize=7)
-    for ax in list(axes.flat)[len(groups) :]:
+def _lines(rows: Rows, line: tuple[str, ...], columns: int) -> list[list[tuple[str, Rows]]]:
+    """Panels by lines: all variants of one `line` side by side, broken after so many columns."""
+    grouped: dict[tuple, dict[str, Rows]] = {}
+    for r in rows:
+        grouped.setdefault(tuple(r[k] for k in line), {}).setdefault(r["variant"], []).append(r)
+    lines = []
+    for key, panels in grouped.items():
+        named = [(f"{str(key[0]).replace('_', '-')}: {variant}", mine) for variant, mine in panels.items()]
+        lines += [named[i : i + columns] for i in range(0, len(named), columns)]
+    return lines
+
+
+def _panels(lines: list[list[tuple[str, Rows]]], columns: int, key: str, limits, label: str, caption: str) -> Figure:
+    size = (2.3 * columns, 2.0 * len(lines) + 0.6)
+    figure, axes = plt.subplots(len(lines), columns, figsize=size, layout="constrained", squeeze=False)
+    for ax in axes.flat:
         ax.set_axis_off()
-    assert image is not None
-    figure.colorbar(image, ax=axes, label=label, shrink=0.5, extend="both")
+    for row, panels in zip(axes, lines, strict=True):
+        for ax, (title, mine) in zip(row, panels, strict=False):
+            ax.set_axis_on()
+            image = _map(ax, mine, key, limits, PLANES[mine[0].get("plane", "alpha-theta")])
+            ax.set_title(title, fontsize=7)
+    bar = figure.colorbar(image, ax=axes, label=label, location="bottom", shrink=0.5, aspect=40, extend="both")
+    bar.ax.tick_params(labelsize=7)
     figure.supxlabel(caption, fontsize=6)
     return figure
 
 
 def stability(rows: Rows, caption: str) -> Figure:
     """Digits lost, form by form."""
-    return _panels(
-        rows,
-        ("quantity", "variant", "plane"),
-        5,
-        "digits",
-        (-0.3, 6),
-        "log₁₀ of the median error [ULP]; × NaN or inf",
-        caption,
-    )
+    label = "log₁₀ of the error that 95 % of the points stay below [ULP; samplers: 2⁻²⁴]; × NaN or inf"
+    return _panels(_lines(rows, ("quantity", "plane"), 5), 5, "digits", (-0.3, 6), label, caption)
 
 
 def variance(rows: Rows, caption: str) -> Figure:
@@ -200,13 +202,15 @@ def variance(rows: Rows, caption: str) -> Figure:
             | {"first": r["first"], "second": r["second"], "ratio": ratio}
         )
     label = "log₁₀ of 1/(variance × time) over the cap's"
-    return _panels(made, ("quantity", "variant"), 4, "ratio", (-2, 2), label, caption)
+    named = [[r for r in made if r["quantity"] == name] for name in _unique(made, "quantity")]
+    panels = [(f"{part[0]['quantity']} ({part[0]['variant']})", part) for part in named]
+    return _panels([panels[i : i + 4] for i in range(0, len(panels), 4)], 4, "ratio", (-2, 2), label, caption)
 
 
 def gradient(rows: Rows, caption: str) -> Figure:
     """Error of ∂/∂α."""
     label = "log₁₀ of the relative error of ∂/∂α; × not finite"
-    return _panels(rows, ("quantity", "variant"), 4, "error", (-7.5, 0), label, caption)
+    return _panels(_lines(rows, ("quantity",), 3), 3, "error", (-7.5, 0), label, caption)
 
 
 DRAWINGS: dict[str, Callable[[Rows, str], Figure]] = {

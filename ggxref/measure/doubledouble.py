@@ -7,6 +7,7 @@ Nothing here is proven: `tests/test_measure_reference.py` compares what is built
 
 from fractions import Fraction
 from math import factorial
+from typing import Any
 
 import numpy as np
 
@@ -40,7 +41,7 @@ class DD:
     __slots__ = ("hi", "lo")
     __array_ufunc__ = None  # `array * DD` comes here, not element by element
 
-    def __init__(self, hi, lo=0.0):
+    def __init__(self, hi: Any, lo: Any = 0.0):
         self.hi, self.lo = hi, lo
 
     def __add__(self, other):

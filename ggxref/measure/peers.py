@@ -42,7 +42,7 @@ def _subjects(mi, dr, points, alpha, rng):
     at.wi = wi
     dr.eval(u, wi, wo, wm, at)
 
-    def done(*values):
+    def done(*values) -> object:
         dr.eval(*values)
         dr.sync_thread()
 

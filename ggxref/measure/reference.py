@@ -100,8 +100,8 @@ def ndf_beckmann(wm, alpha):
     z = _unit(wm)[2]
     above = z.hi > 0
     square = where(above, z, 1.0) * where(above, z, 1.0)
-    exponent = maximum(-_tangent_square(wm, alpha), -600.0)
-    seen = above & (exponent.hi > -600)
+    exponent = maximum(-_tangent_square(wm, alpha), -700.0)
+    seen = above & (exponent.hi > -700)
     return where(seen, exp(exponent) / (PI * alpha[0] * alpha[1] * square * square), 0.0)
 
 

@@ -146,7 +146,8 @@ SKEWED = ("ndf.ellipsoid", "masking.g1_ellipsoid", "sampling.ellipsoid_cap.pdf",
 
 def stability(points: int) -> Pieces:
     """Digits lost over α × θ, α × anisotropy, and skew × θ."""
-    pieces = {f"{name}-{plane}": partial(_stability, name, plane) for plane in MAPS for name in STABLE}
+    pieces = {f"{name}-alpha-theta": partial(_stability, name, "alpha-theta") for name in STABLE}
+    pieces |= {f"{name}-alpha-ratio": partial(_stability, name, "alpha-ratio") for name in STABLE[:3]}
     return pieces | {name: partial(_skewed, name) for name in SKEWED}
 
 

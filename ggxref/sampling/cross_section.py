@@ -23,6 +23,6 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
     sin_theta = stable.sqrt(i.x * i.x + i.y * i.y)
     moved, lifted, z = crescent(along, 1 - u[1], i, sin_theta)
     # The listing's w1 = (-sin, cos, 0) and w2 = (-z cos, -z sin, sin_theta) in the azimuth of wi; w1 = x at the pole.
-    cos_i, sin_i = stable.azimuth(i.x, i.y, pole=(0, -1))
+    cos_i, sin_i = stable.azimuth(i.x, i.y, pole=(0.0, -1.0))
     outward = lifted * sin_theta - moved * i.z
     return unstretch(cos_i * outward - sin_i * across, sin_i * outward + cos_i * across, z, alpha)
