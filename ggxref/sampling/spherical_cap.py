@@ -5,6 +5,7 @@ import math
 import jax.numpy as jnp
 
 from ggxref._types import Scalar, Vec2, Vec3
+from ggxref.ellipsoid import length
 from ggxref.sampling._sphere import half_in_cap, ray, unstretch
 from ggxref.sampling._visible import pdf_ggx as pdf
 
@@ -32,5 +33,8 @@ def cap_pdf(wo: Vec3, wi: Vec3) -> Scalar:
     square = wi[0] ** 2 + wi[1] ** 2
     below = wi[2] < 0
     height = jnp.where(below, square / jnp.where(below, 1 - wi[2], 1), 1 + wi[2])
-    inside = (wo[2] > -wi[2]) & (height > 0)
+    # z_o > −z_i, in the sine of the sum of the polar angles: near the poles the heights have lost the angles.
+    sines = length(wi[0], wi[1], 0), length(wo[0], wo[1], 0)
+    above = (wi[2] > 0) & (wo[2] > 0)
+    inside = (above | (sines[0] * wo[2] + sines[1] * wi[2] > 0)) & (height > 0)
     return jnp.where(inside, 1 / (2 * math.pi * jnp.where(inside, height, 1)), 0)
