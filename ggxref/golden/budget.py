@@ -23,9 +23,10 @@ from flint import arb
 
 from ggxref.golden.cases import Case, leaves
 from ggxref.golden.compare import vectors
+from ggxref.golden.exact import evaluate
 from ggxref.golden.linear import dot
 from ggxref.golden.rounding import Format, Undecided, decimal, ends, ulp
-from ggxref.oracle.precision import evaluate, exact, working
+from ggxref.oracle.precision import exact, working
 
 # Relative step of the difference quotient: its own error is 2^-80 of a second derivative.
 STEP = Fraction(1, 1 << 80)
@@ -60,16 +61,15 @@ def perturbed(x: Any, matrix: bool, row: Fraction = Fraction(1)) -> Iterator[tup
 
 def sensitivity(case: Case, bits: int = 256) -> Sensitivity:
     """Condition number and spread of a case; `OverflowError` where f jumps."""
-    inputs = case.values | case.function.options
     with working(bits):
-        result = evaluate(case.function.name, inputs, bits)
+        result = evaluate(case.function, case.values, bits)
         value = [*leaves(result)]
         if not all(f.is_finite() for f in value):
             return Sensitivity(Fraction(0), Fraction(0))
         relative, absolute = [arb(0)] * len(value), [arb(0)] * len(value)
         for argument, x in case.values.items():
             for y, number, size in perturbed(x, case.function.arguments[argument] in MATRICES):
-                moved = leaves(evaluate(case.function.name, inputs | {argument: y}, bits))
+                moved = leaves(evaluate(case.function, case.values | {argument: y}, bits))
                 changes = [abs(m - f) for m, f in zip(moved, value, strict=True)]
                 half = exact(ulp(number, case.fmt) / size / 2 if number else Fraction(0))
                 relative = [r + c for r, c in zip(relative, changes, strict=True)]

@@ -71,10 +71,12 @@ def stretched(s: Stream, fmt: Format, quantity: str, x: Any) -> Any:
 def case(seed: int, function: Function, fmt: Format, index: int) -> Case | None:
     """The input of candidate number `index`; None where it is outside the function's domain."""
     cycle = themes(function)
-    theme = cycle[index % len(cycle)]
+    place = index % len(cycle)
+    theme = cycle[place]
     post = theme.get("_post")
-    # A swapped case repeats the draws of the corner before it; between two corners stands a plain draw.
-    label = seed, function.name, fmt.name, index - 2 if post == "swap" else index
+    # A swapped case repeats the draws of its partner, the same theme unswapped.
+    partner = cycle.index({k: v for k, v in theme.items() if k != "_post"}) if post == "swap" else place
+    label = seed, function.name, fmt.name, index - place + partner
     drawn = Draw(label, fmt, theme)
     exact = {argument: getattr(drawn, quantity) for argument, quantity in function.arguments.items()}
     if post == "swap":

@@ -85,6 +85,7 @@ def document(order: Order, function: str, groups: dict[str, list[str]]) -> str:
         "schema": SCHEMA,
         "function": f.name,
         "options": f.options,
+        "derivative": f.derivative,
         "statement": f.statement,
         "source": f.source,
         "note": f.note,
@@ -97,7 +98,7 @@ def document(order: Order, function: str, groups: dict[str, list[str]]) -> str:
         "flags": {flag: sentence for flag, sentence in SENTENCES.items() if flag in flags},
         "count": len(inputs),
     }
-    optional = ("options", "note")
+    optional = ("options", "derivative", "note")
     top = ",\n".join(f"{compact(k)}: {compact(v)}" for k, v in header.items() if v or k not in optional)
     bodies = (
         f'{{"id":{i},"dtype":{compact(dtype)},"tests":[\n' + ",\n".join(lines) + "\n]}"
@@ -128,7 +129,8 @@ def order(functions: str, dtypes: str, count: int | None, seed: int) -> Order:
 
 
 def belongs(function: str, name: str) -> bool:
-    return name == "all" or function == name or function.startswith(name + ".")
+    """Whether a name asks for the function: its own, or one of all above it."""
+    return name in ("all", function) or (name not in FUNCTIONS and function.startswith(name + "."))
 
 
 @contextmanager

@@ -152,7 +152,9 @@ def tests(text: bytes, where: str) -> Iterator[Test]:
     need(schema == SCHEMA, f"{where}: wanted schema {SCHEMA!r}, got {schema!r}")
     name, options = entry(document, "function", str, where), document.get("options", {})
     need(isinstance(options, dict), f"{where}: 'options' wants a JSON object, got {kind(options)}")
-    function = choice(".".join([name, *map(str, options.values())]), FUNCTIONS, "function", where)
+    derivative = document.get("derivative")
+    parts = [name, *options.values()] + ([f"d_{derivative}"] if derivative else [])
+    function = choice(".".join(map(str, parts)), FUNCTIONS, "function", where)
     flags = entry(document, "flags", dict, where)
     claimed, seen = entry(document, "count", int, where), 0
     for group in entry(document, "groups", list, where):

@@ -1,6 +1,6 @@
 """The catalogue's entries for the samplers and their densities, and the table of all entries."""
 
-from ggxref.golden.catalogue import Function, entry
+from ggxref.golden.catalogue import Function, entry, gradient
 from ggxref.golden.formulas import BSDF, ELLIPSOID, FRESNEL, GEOMETRY, JACOBIAN, MASKING, NDF, SLOPES
 
 # Convention in all samplers: u[0] turns, u[1] reaches.
@@ -194,4 +194,22 @@ _ALL = [
     *(GEOMETRY + JACOBIAN + ELLIPSOID + SLOPES + NDF + MASKING + FRESNEL + NORMALS + SLOPE),
     *(_cavity("ggx") + _cavity("beckmann") + CAPS + LUNE + ELLIPSOIDS + BSDF),
 ]
+_GRADIENTS = {
+    "ndf.ggx": ("wm", "alpha"),
+    "ndf.beckmann": ("wm", "alpha"),
+    "ndf.student_t": ("wm", "alpha"),
+    "ndf.ellipsoid": ("wm", "A"),
+    "masking.g1_ggx": ("alpha",),
+    "masking.g1_beckmann": ("alpha",),
+    "masking.g1_v_cavity": ("wm",),
+    "masking.g1_ellipsoid": ("A",),
+    "sampling.normals.pdf_ggx": ("wm", "alpha"),
+    "sampling.normals.pdf_beckmann": ("wm", "alpha"),
+    "sampling.slope_beckmann.pdf": ("wm", "alpha"),
+    "sampling.v_cavity.pdf.ggx": ("wm", "alpha"),
+    "sampling.spherical_cap.pdf": ("wm", "alpha"),
+    "sampling.bounded_cap.pdf": ("wm", "alpha"),
+    "sampling.lune.pdf": ("wm", "A"),
+}
+_ALL += [gradient(f, argument) for f in _ALL for argument in _GRADIENTS.get(f.id, ())]
 FUNCTIONS: dict[str, Function] = {function.id: function for function in _ALL}

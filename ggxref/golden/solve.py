@@ -10,11 +10,12 @@ from flint import arb
 from ggxref.golden.budget import allowance, sensitivity
 from ggxref.golden.cases import Case, leaves, mapped
 from ggxref.golden.catalogue import Function
+from ggxref.golden.exact import evaluate
 from ggxref.golden.flags import flags_of, is_subnormal
 from ggxref.golden.rounding import DIGITS, F16, Format, Undecided, decimal_ball, ends, round_ball, to_hex
 from ggxref.golden.steady import steady
 from ggxref.golden.stressed import Stressed
-from ggxref.oracle.precision import MAX_BITS, evaluate, working
+from ggxref.oracle.precision import MAX_BITS, working
 
 # 40 digits are 133 bits: nearly every case is decided at once.
 FIRST_BITS = 192
@@ -31,11 +32,11 @@ class Exact:
 
 def proven(function: Function, inputs: dict[str, Any], fmt: Format) -> Exact:
     """The result at the first precision that proves all of its roundings; `Undecided` if none does."""
-    bits, inputs = FIRST_BITS, inputs | function.options
+    bits = FIRST_BITS
     while True:
         try:
             with working(bits):
-                result = evaluate(function.name, inputs, bits)
+                result = evaluate(function, inputs, bits)
                 return Exact(
                     mapped(lambda ball: bits_of(ball, fmt), result), mapped(digits_of, result), values_of(result)
                 )

@@ -1,7 +1,8 @@
 """The corners that tests are drawn in: a theme names the variant of each quantity that `inputs.draw` gives it.
 
-A theme is used for a function that takes all of the theme's quantities. `_post` names a change made after the draw: `swap` exchanges x
-and y of the theme before it, `stretch` makes directions longer or shorter by a few ulp, `minus zero` turns +0 into −0.
+A theme is used for a function that takes all of the theme's quantities. `_post` names a change made after the draw:
+`swap` exchanges x and y in the test of the same theme unswapped, `stretch` makes directions longer or shorter by a few
+ulp, `minus zero` turns +0 into −0.
 """
 
 from collections.abc import Iterator, Mapping
@@ -105,13 +106,14 @@ _FROM = {"u3": "u", "rows": "u", "mean": "A", "scatter": "A", "n_i": "eta", "fac
 
 
 def themes(function: Function) -> list[Theme]:
-    """The themes that concern the function, each followed or preceded by plain draws: at least half of all are plain."""
+    """The themes that concern the function, with a plain draw before them and after every second."""
     quantities = set(function.arguments.values())
     quantities |= {_FROM[q] for q in quantities if q in _FROM}
     if "slope" in quantities:
         quantities.add("wm")
     corners = [t for t in THEMES if {q for q in t if q != "_post"} <= quantities | shapes(quantities)]
-    return [theme for corner in corners for theme in (corner, PLAIN)] or [PLAIN]
+    plain = [[PLAIN] if i % 2 else [] for i in range(len(corners))]
+    return [PLAIN, *(theme for corner, more in zip(corners, plain, strict=True) for theme in (corner, *more))]
 
 
 def shapes(quantities: set[str]) -> set[str]:
