@@ -170,6 +170,38 @@ def chart(
         print("\n".join(map(str, written)))
 
 
+@app.command(epilog="Example: ggxref choose experiments/scenes/brushed.toml --tolerance 0.01 --figure brushed.png")
+def choose(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Shapes, lights, materials, view.")],
+    tolerance: Annotated[float, typer.Option(help="Most deviation from the richest models, over mean radiance.")] = 0.01,
+    json: Annotated[Path | None, typer.Option(metavar="PATH", help="Write the findings here too.")] = None,
+    figure: Annotated[Path | None, typer.Option(metavar="PATH.png", help="Cost against deviation, and pictures.")] = None,
+    pictures: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Richest and chosen picture as PNG and NPY; DIR is made.")
+    ] = None,
+) -> None:
+    """Find the cheapest models with which a scene's picture stays within a tolerance of the richest ones'."""
+    from ggxref.scene import image, report
+    from ggxref.scene import choose as search
+    from ggxref.scene.read import read
+
+    for option, path in (("--json", json), ("--figure", figure), ("--pictures", pictures)):
+        if path and not path.parent.is_dir():
+            raise InputError(f"{option}: {path} cannot be written: there is no directory {path.parent}")
+    console = Console()
+    with Console(stderr=True).status("reading") as status:
+        result = search.choose(read(scene), tolerance, lambda doing: status.update(f"rendering: {doing}"))
+    console.print(report.tables(result))
+    if json:
+        write_atomically(json, dumps(report.document(result), indent=1) + "\n")
+    if figure:
+        write_atomically(figure, report.figure(result))
+    if pictures:
+        pictures.mkdir(exist_ok=True)
+        for name, each in result.pictures.items():
+            image.write(pictures / name, each.mean)
+
+
 def _interrupted(signum: int, frame: object) -> None:
     print("ggxref: interrupted", file=sys.stderr)
     raise SystemExit(130)
