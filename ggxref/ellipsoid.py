@@ -24,9 +24,10 @@ def cofactor(A: Mat3) -> tuple[Mat3, Scalar]:
     The rows of a smooth or skewed `A` are nearly parallel: plain minors would lose the digits that they share, once each,
     and the determinant twice.
     """
-    a, b, c = A
-    rows = jnp.stack([jnp.stack(stable.cross(*pair)) for pair in ((b, c), (c, a), (a, b))])
-    return rows, stable.dot(a, rows[0])
+    # The minor (i, j) takes the rows i + 1 and i + 2 and the columns j + 1 and j + 2, around the corner.
+    E = jnp.tile(A, (2, 2))
+    rows = stable.dot((E[1:4, 1:4], E[1:4, 2:5]), (E[2:5, 2:5], -E[2:5, 1:4]))
+    return rows, stable.dot(A[0], rows[0])
 
 
 def length(x: Real, y: Real, z: Real) -> Scalar:

@@ -35,11 +35,10 @@ def refract(w: Vec3, wm: Vec3, eta: Real) -> Vec3:
 
 
 def _sum(wi, wo, n_i, n_o):
-    """The components of `n_i wi + n_o wo` for exactly unit directions: where they nearly cancel, what rounding added to
-    the lengths is as large as the sum.
+    """`n_i wi + n_o wo` for exactly unit directions: where they nearly cancel, what rounding added to the lengths is as
+    large as the sum.
     """
-    weights = n_i, n_o, -n_i * stable.excess(wi), -n_o * stable.excess(wo)
-    return tuple(stable.dot(weights, (x, y, x, y)) for x, y in zip(wi, wo, strict=True))
+    return stable.dot((n_i, n_o, -n_i * stable.excess(wi), -n_o * stable.excess(wo)), (wi, wo, wi, wo))
 
 
 def half_reflection(wi: Vec3, wo: Vec3) -> Vec3:

@@ -8,9 +8,12 @@ import math
 
 import jax
 import jax.numpy as jnp
-from jax import lax
+from jax import Array, lax
+from jaxtyping import Float
 
 from ggxref._types import Real, Scalar, Vec3
+
+Components = Float[Array, " n"] | tuple[Float[Array, "..."], ...]
 
 # Bits of the significand that the high half keeps, so that a product of two halves is exact.
 _HIGH = {jnp.dtype("float32"): (jnp.uint32, 0xFFFFF000), jnp.dtype("float64"): (jnp.uint64, 0xFFFFFFFFF8000000)}
@@ -39,8 +42,9 @@ def _two_sum(a, b):
 
 
 @jax.custom_jvp
-def dot(a: Vec3 | tuple[Scalar, ...], b: Vec3 | tuple[Scalar, ...]) -> Scalar:
-    r"""$a \cdot b$ in twice the working precision, rounded once: shape () from two (3,), or from two tuples of numbers.
+def dot(a: Components, b: Components) -> Array:
+    r"""$a \cdot b$ in twice the working precision, rounded once: from two (3,), or from two tuples of equally many
+    components, whose shapes broadcast.
 
     The plain sum has an unbounded relative error where the vectors are nearly perpendicular, and there stand the
     factor $\omega_i \cdot \omega_m$ of every visible density and the decision which side of a microfacet is seen.
@@ -66,10 +70,11 @@ def _dot_jvp(primals, tangents):
     return dot(a, b), change
 
 
-def cross(a: Vec3, b: Vec3) -> tuple[Scalar, Scalar, Scalar]:
-    """The components of $a \\times b$, each as exact as `dot`: the plain ones cancel where a and b are nearly parallel."""
-    (ax, ay, az), (bx, by, bz) = a, b
-    return dot((ay, az), (bz, -by)), dot((az, ax), (bx, -bz)), dot((ax, ay), (by, -bx))
+def cross(a: Vec3, b: Vec3) -> Vec3:
+    """$a \\times b$, each component as exact as `dot`: the plain ones cancel where a and b are nearly parallel."""
+    # Component i takes the components i + 1 and i + 2, around the corner.
+    a, b = jnp.tile(a, 2), jnp.tile(b, 2)
+    return dot((a[1:4], a[2:5]), (b[2:5], -b[1:4]))
 
 
 def excess(w: Vec3) -> Scalar:
@@ -114,7 +119,7 @@ def direction(x: Scalar, y: Scalar, z: Scalar) -> Vec3:
     return v / jnp.sqrt(jnp.where(square > 0, square, 1))
 
 
-def azimuth(x: Scalar, y: Scalar, pole: tuple[float, float] = (1, 0)) -> tuple[Scalar, Scalar]:
+def azimuth(x: Scalar, y: Scalar, pole: tuple[float, float] = (1.0, 0.0)) -> tuple[Scalar, Scalar]:
     """Cosine and sine of the azimuth of `(x, y)`; `pole` at the origin, where there is none."""
     square = x * x + y * y
     scale = 1 / jnp.sqrt(jnp.where(square > 0, square, 1))
