@@ -10,6 +10,7 @@ from importlib import import_module
 import numpy as np
 
 from ggxref.errors import InputError
+from ggxref.oracle.precision import lookup
 from ggxref.verify.batch import batched
 
 PAPERS = ("heitz2014", "walter2014", "dupuy2023", "tokuyoshi2024", "ours")
@@ -18,8 +19,10 @@ CHECKS = (
     "heitz2014",
     "heitz2014_slopes",
     "heitz2014_bsdf",
+    "heitz2014_exact",
     "walter2014",
     "walter2014_sampling",
+    "walter2014_exact",
     "dupuy2023",
     "tokuyoshi2024",
     "ours",
@@ -86,7 +89,7 @@ class Check:
 
     def error(self, samples: int, *, control: bool = False) -> float:
         """Error of the check on the formulas, or (`control`) on the wrong one in place of the first."""
-        functions = [batched(f) if isinstance(f, str) else f for f in self.functions]
+        functions = [formula(f) if isinstance(f, str) else f for f in self.functions]
         if control:
             functions[0] = self.change(functions[0])
         settings = dict(self.settings)
@@ -117,6 +120,13 @@ class Check:
             return self.error(samples, control=control), ""
         except Exception as problem:  # one broken formula must not hide the verdict on the others
             return np.inf, f"{'control: ' if control else ''}{type(problem).__name__}: {problem}"
+
+
+def formula(name: str) -> Callable:
+    """The function of that name below `ggxref`: the library's batched, the oracle's as it is."""
+    if name.startswith("oracle."):
+        return lookup(name.removeprefix("oracle."))
+    return batched(name)
 
 
 _register: list[Check] = []
