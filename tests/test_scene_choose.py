@@ -1,0 +1,112 @@
+"""The search takes what is within the tolerance, takes back what is too much together, and keeps the richest at 0."""
+
+import numpy as np
+import pytest
+
+from ggxref.errors import InputError
+from ggxref.scene import choose, read
+from ggxref.scene.compare import Deviation
+
+SCENE = """
+[view]
+origin = [0, -4, 1]
+width = 8
+height = 6
+[materials.skewed]
+surface = "conductor"
+A = [[0.1, 0, 0], [0, 0.3, 0], [0.1, -0.2, 1]]
+eta = 0.2
+k = 3.9
+[materials.plain]
+surface = "conductor"
+alpha = 0.1
+f0 = 0.9
+[[shapes]]
+kind = "sphere"
+center = [-1, 0, 0]
+radius = 0.9
+material = "skewed"
+[[shapes]]
+kind = "sphere"
+center = [1, 0, 0]
+radius = 0.9
+material = "plain"
+[[lights]]
+kind = "sky"
+bottom = 0.2
+top = 0.8
+"""
+
+# What an option takes off the picture, per material; plainer on several axes, they add.
+LOSS = {
+    "skewed": {"isotropic": 0.3, "anisotropic": 0.1, "separable": 0.006, "one": 0.02, "schlick": 0.006},
+    "plain": {"isotropic": 0.0, "anisotropic": 0.0, "separable": 0.001, "one": 0.03},
+}
+ERROR = 1e-4
+
+
+@pytest.fixture
+def search(tmp_path, monkeypatch):
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    asked = []
+
+    def measure(self, choices):
+        asked.append(choices)
+        losses = {
+            name: sum(LOSS[name].get(getattr(choice, axis), 0.0) for axis in choose.AXES)
+            for name, choice in choices.items()
+        }
+        return {name: Deviation(loss, ERROR) for name, loss in losses.items()}
+
+    monkeypatch.setattr(choose._Search, "measure", measure)
+    monkeypatch.setattr(choose._Search, "cost", lambda self, name, choice: 100.0)
+    make = lambda tolerance: choose._Search(read.read(path), tolerance, lambda text: None)  # noqa: E731
+    return make, asked
+
+
+def settle(search):
+    steps = choose._steps(search)
+    return choose._together(search, choose._affordable(search, steps), steps)
+
+
+def test_takes_what_is_within(search):
+    chosen, found = settle(search[0](0.05))
+    assert (chosen["plain"].model, chosen["plain"].g2, chosen["plain"].fresnel) == ("isotropic", "separable", "one")
+    assert (chosen["skewed"].model, chosen["skewed"].g2, chosen["skewed"].fresnel) == ("ellipsoid", "separable", "one")
+    assert all(each.most < 0.05 for each in found.values())
+
+
+def test_takes_back_what_is_too_much_together(search):
+    """At 0.01 each of the skewed material's small steps is within, and the two together are not."""
+    chosen, found = settle(search[0](0.01))
+    small = chosen["skewed"].g2 == "separable", chosen["skewed"].fresnel == "schlick"
+    assert sorted(small) == [False, True]
+    assert chosen["plain"].fresnel == "schlick"  # a neighbour's excess takes nothing from it but its own: 0.03
+    assert all(each.most < 0.01 for each in found.values())
+
+
+def test_tolerance_0_keeps_the_richest(search):
+    every = search[0](0.0)
+    chosen, found = settle(every)
+    assert chosen == every.richest
+    assert all(each.value == 0 for each in found.values())
+
+
+def test_sampler_follows_the_model(search):
+    chosen, _ = settle(search[0](0.2))
+    assert (chosen["skewed"].model, chosen["skewed"].sampler) == ("anisotropic", "spherical_cap")
+    chosen, _ = settle(search[0](0.05))
+    assert (chosen["skewed"].model, chosen["skewed"].sampler) == ("ellipsoid", "ellipsoid_cap")
+
+
+def test_an_option_is_measured_for_all_materials_at_once(search):
+    make, asked = search
+    choose._steps(make(0.05))
+    assert len(asked) == 5  # isotropic, anisotropic, separable, one, schlick; not ten
+
+
+@pytest.mark.parametrize("tolerance", [-0.1, np.nan, np.inf])
+def test_bad_tolerance_is_refused(search, tolerance):
+    with pytest.raises(InputError, match="--tolerance"):
+        choose.choose(search[0](0.1).scene, tolerance)
