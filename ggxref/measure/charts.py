@@ -139,7 +139,8 @@ def _map(ax, rows, key, limits, labels):
         grid[at], fault[at] = r[key], r.get("fault", 0.0)
     image = ax.imshow(grid, origin="lower", aspect="auto", cmap="Greys", vmin=limits[0], vmax=limits[1])
     for i, j in zip(*np.nonzero(fault > 0), strict=True):
-        ax.plot(j, i, "x", color="black", ms=2.5, mew=0.6)
+        dark = grid[i, j] > (limits[0] + limits[1]) / 2
+        ax.plot(j, i, "x", color="white" if dark else "black", ms=2.5, mew=0.6)
     for axis, values in ((ax.xaxis, first), (ax.yaxis, second)):
         ticks = np.unique(np.linspace(0, len(values) - 1, 4).astype(int))
         axis.set_ticks(ticks, [f"{values[t]:.2g}" if values[t] < 80 else f"{values[t]:g}"[:6] for t in ticks])
@@ -176,16 +177,18 @@ def _panels(lines: list[list[tuple[str, Rows]]], columns: int, key: str, limits,
             ax.set_axis_on()
             image = _map(ax, mine, key, limits, PLANES[mine[0].get("plane", "alpha-theta")])
             ax.set_title(title, fontsize=7)
-    bar = figure.colorbar(image, ax=axes, label=label, location="bottom", shrink=0.5, aspect=40, extend="both")
-    bar.ax.tick_params(labelsize=7)
-    figure.supxlabel(caption, fontsize=6)
+    text = f"{label}\n{caption}"
+    figure.colorbar(image, ax=axes, label=text, location="bottom", shrink=0.5, aspect=40, pad=0.02, extend="both")
     return figure
 
 
 def stability(rows: Rows, caption: str) -> Figure:
     """Digits lost, form by form."""
     label = "log₁₀ of the error that 95 % of the points stay below [ULP; samplers: 2⁻²⁴]; × NaN or inf"
-    return _panels(_lines(rows, ("quantity", "plane"), 5), 5, "digits", (-0.3, 6), label, caption)
+    # The library alone knows skewed shapes: one line holds all its quantities.
+    skewed = [r | {"quantity": "skewed", "variant": r["quantity"]} for r in rows if r["plane"] == "skew-theta"]
+    lines = _lines([r for r in rows if r["plane"] != "skew-theta"] + skewed, ("quantity", "plane"), 5)
+    return _panels(lines, 5, "digits", (-0.3, 6), label, caption)
 
 
 def variance(rows: Rows, caption: str) -> Figure:
