@@ -24,11 +24,10 @@ def dielectric(cos_i: Real, eta: Real) -> Scalar:
     total = square <= 0
     ct = stable.sqrt(square)
     # Both numerators times their conjugates: ηc − c_t and c − ηc_t cancel as η → 1, these do not.
-    s = jnp.sqrt(jnp.maximum((1 - c) * (1 + c), 0))
     s_sum, p_sum = eta * c + ct, c + eta * ct
     fine = (s_sum > 0) & ~total & (gap != 0)
     r_s = gap / jnp.where(fine, s_sum, 1) ** 2
-    r_p = gap * (c - eta * s) * (c + eta * s) / jnp.where(fine, p_sum, 1) ** 2
+    r_p = gap * (c * c - eta**2 * (1 - c) * (1 + c)) / jnp.where(fine, p_sum, 1) ** 2
     return jnp.where(total & (gap < 0), 1, jnp.where(fine, (r_s * r_s + r_p * r_p) / 2, 0))
 
 
@@ -42,11 +41,11 @@ def conductor(cos_i: Real, eta: Real, k: Real) -> Scalar:
     Fresnel's equations for absorbing media, as in heitz2014 §2.1 and walter2014 §1.1 ("complex index of refraction").
     """
     c = jnp.abs(jnp.asarray(cos_i))
-    sin_square = jnp.maximum((1 - c) * (1 + c), 0)
+    sin_square = (1 - c) * (1 + c)
     # (a + ib)² = (η + ik)² − sin²θ; the smaller of a, b comes from the product ab = ηk, as its difference cancels.
     gap = (eta - 1) * (eta + 1) - k * k
     real, imaginary = gap + c * c, eta * k
-    modulus = jnp.sqrt(real * real + 4 * imaginary * imaginary)
+    modulus = stable.sqrt(real * real + 4 * imaginary * imaginary)
     large = stable.sqrt((modulus + jnp.abs(real)) / 2)
     small = imaginary / jnp.where(large > 0, large, 1)
     a, b = jnp.where(real >= 0, large, small), jnp.where(real >= 0, small, large)

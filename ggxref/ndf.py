@@ -37,12 +37,12 @@ def beckmann(wm: Vec3, alpha: Vec2) -> Scalar:
 
     heitz2014 §5 (Beckmann slopes over z⁴).
     """
-    z_square = wm[2] ** 2
-    # z⁴ would underflow to 0/0 towards the horizon; D has underflowed to 0 long before (α < 1e4).
-    seen = (wm[2] > 0) & (z_square > math.sqrt(float(jnp.finfo(wm.dtype).tiny)) * 2)
+    rho, z_square = _stretched(wm, alpha), wm[2] ** 2
+    # Beyond this exponent D is 0 in the dtype; towards the horizon z⁴ then is 0 too, and D or its gradient 0/0.
+    seen = (wm[2] > 0) & (rho < -2 * math.log(float(jnp.finfo(wm.dtype).tiny)) * z_square)
     z_square = jnp.where(seen, z_square, 1)
     # Half the exponent twice: the peak 1/(π αx αy) reaches into tails where the exponential alone has underflowed.
-    half = jnp.exp(-_stretched(wm, alpha) / (2 * z_square))
+    half = jnp.exp(-rho / (2 * z_square))
     D = half * (half / (math.pi * alpha[0] * z_square * (alpha[1] * z_square)))
     return jnp.where(seen, D, 0)
 
