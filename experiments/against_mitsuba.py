@@ -73,7 +73,7 @@ def main() -> None:
     batches, seconds = [], 0.0
     for seed in range(8):
         begun = time.process_time()
-        batches.append(np.array(mi.render(scene, spp=arguments.samples // 8, seed=seed))[..., :3].mean(axis=-1))
+        batches.append(np.array(mi.render(scene, spp=arguments.samples // 8, seed=seed))[..., :3].mean(axis=-1))  # pyright: ignore[reportArgumentType]
         seconds += time.process_time() - begun
     peer, peer_error = np.mean(batches, axis=0), np.std(batches, axis=0, ddof=1) / math.sqrt(8)
 
