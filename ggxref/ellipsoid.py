@@ -30,6 +30,7 @@ def cofactor(A: Mat3) -> tuple[Mat3, Scalar]:
     return rows, stable.dot(A[0], rows[0])
 
 
+@stable.widened
 def length(x: Real, y: Real, z: Real) -> Scalar:
     """Euclidean norm of a vector in components; its gradient at the zero vector is 0."""
     return stable.sqrt(x * x + y * y + z * z)

@@ -4,7 +4,9 @@ Every function takes and returns the dtype of its arguments. Where a derivative 
 derivative returned is 0, so that a gradient never holds NaN.
 """
 
+import functools
 import math
+from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
@@ -41,7 +43,39 @@ def _two_sum(a, b):
     return s, (a - (s - t)) + (b - t)
 
 
+def widened(function: Callable) -> Callable:
+    """`function`, computed in float32 where it is given half precision: the square of 1e-4 is 0 in float16."""
+
+    @functools.wraps(function)
+    def in_float32(*args, **policy):
+        dtype = jnp.result_type(*jax.tree.leaves(args))
+        if dtype.itemsize > 2:
+            return function(*args, **policy)
+        wide = jax.tree.map(lambda x: jnp.asarray(x, jnp.float32), args)
+        return jax.tree.map(lambda x: x.astype(dtype), function(*wide, **policy))
+
+    return in_float32
+
+
 @jax.custom_jvp
+def _dot(a, b):
+    (total, rest), *products = (_two_product(x, y) for x, y in zip(a, b, strict=True))
+    for product, error in products:
+        total, lost = _two_sum(total, product)
+        rest = rest + (error + lost)
+    return total + rest
+
+
+@_dot.defjvp
+def _dot_jvp(primals, tangents):
+    (a, b), (da, db) = primals, tangents
+    change, *terms = (x * dy + dx * y for x, dx, y, dy in zip(a, da, b, db, strict=True))
+    for term in terms:
+        change = change + term
+    return _dot(a, b), change
+
+
+@widened
 def dot(a: Components, b: Components) -> Array:
     r"""$a \cdot b$ in twice the working precision, rounded once: from two (3,), or from two tuples of equally many
     components, whose shapes broadcast.
@@ -50,24 +84,7 @@ def dot(a: Components, b: Components) -> Array:
     factor $\omega_i \cdot \omega_m$ of every visible density and the decision which side of a microfacet is seen.
     Ogita, Rump & Oishi 2005, algorithm 5.3.
     """
-    dtype = a[0].dtype
-    if dtype.itemsize == 2:  # every product of two half-precision numbers is a float32
-        wide = [tuple(x.astype(jnp.float32) for x in v) for v in (a, b)]
-        return dot(*wide).astype(dtype)
-    (total, rest), *products = (_two_product(x, y) for x, y in zip(a, b, strict=True))
-    for product, error in products:
-        total, lost = _two_sum(total, product)
-        rest = rest + (error + lost)
-    return total + rest
-
-
-@dot.defjvp
-def _dot_jvp(primals, tangents):
-    (a, b), (da, db) = primals, tangents
-    change, *terms = (x * dy + dx * y for x, dx, y, dy in zip(a, da, b, db, strict=True))
-    for term in terms:
-        change = change + term
-    return dot(a, b), change
+    return _dot(a, b)
 
 
 def cross(a: Vec3, b: Vec3) -> Vec3:
@@ -103,6 +120,7 @@ def _sqrt_jvp(primals, tangents):
     return root, jnp.where(root > 0, 0.5 / jnp.where(root > 0, root, 1), 0) * dx
 
 
+@widened
 def unit(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     """The components divided by their length; the zero vector stays zero, with a zero gradient."""
     square = x * x + y * y + z * z
@@ -110,6 +128,7 @@ def unit(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     return x * scale, y * scale, z * scale
 
 
+@widened
 def direction(x: Scalar, y: Scalar, z: Scalar) -> Vec3:
     """`unit` as one array (3,): what a sampler ends with."""
     # Without the barrier XLA fuses the three components into the result, and computes each of them once for itself and
@@ -119,6 +138,7 @@ def direction(x: Scalar, y: Scalar, z: Scalar) -> Vec3:
     return v / jnp.sqrt(jnp.where(square > 0, square, 1))
 
 
+@widened
 def azimuth(x: Scalar, y: Scalar, pole: tuple[float, float] = (1.0, 0.0)) -> tuple[Scalar, Scalar]:
     """Cosine and sine of the azimuth of `(x, y)`; `pole` at the origin, where there is none."""
     square = x * x + y * y

@@ -15,30 +15,29 @@ from ggxref.sampling._sphere import half_in_cap
 from ggxref.sampling.ellipsoid_cap import from_sphere, to_sphere
 
 
-def _largest_q_less_1(wi, canonical_A):
-    """Maximum of Q - 1 over [0, θ₁]: Q is a sinusoid of 2θ with one maximum in [0°, 90°]."""
+def _largest_q(wi, canonical_A):
+    """c² and c² (max Q - 1) over [0, θ₁]: Q is a sinusoid of 2θ with one maximum in [0°, 90°]."""
     (c00, c10, _), (_, c11, _), (ex, ey, _) = canonical_A
-    sigma_max = (length(c00 + c11, c10, 0) + length(c00 - c11, c10, 0)) / 2
-    c = c00 * c11 / sigma_max
-    p = 1 / (c * c)
+    c = c00 * c11 * 2 / (length(c00 + c11, c10, 0) + length(c00 - c11, c10, 0))
     skew = length(ex, ey, 0)
-    lift, gap = skew * skew * p, (1 - c) * (1 + c) * p  # |e|²/c² and 1/c² - 1
-    # Q - 1 = mean + b cos 2θ + a sin 2θ, b - mean = -gap and a² + b² = mean² + lift: the peak, mean + ‖(a, b)‖, is formed
-    # without the cancellation of either sum.
+    lift, gap = skew * skew, (1 - c) * (1 + c)
+    # c² (Q - 1) = mean + b cos 2θ + |e| sin 2θ, b = mean - gap and b² + |e|² = mean² + |e|² c²: the peak, mean + ‖(|e|, b)‖,
+    # is formed without the cancellation of its sum.
     mean, b = (lift + gap) / 2, (lift - gap) / 2
-    amplitude = length(skew * p, b, 0)
+    amplitude = length(skew, b, 0)
     sunk = mean < 0
-    peak = jnp.where(sunk, lift / jnp.where(sunk, amplitude - mean, 1), mean + amplitude)
+    peak = jnp.where(sunk, lift * c * c / jnp.where(sunk, amplitude - mean, 1), mean + amplitude)
     # cos 2θ₁ = −sin θi; cos²θ₁ = (1 − sin θi)/2.
     sin_i = length(wi[0], wi[1], 0)
     cos_square, sin_square = wi[2] ** 2 / (2 * (1 + sin_i)), (1 + sin_i) / 2
     slant = stable.sqrt(cos_square * sin_square)
-    at_end = gap * sin_square + 2 * skew * p * slant + lift * cos_square
-    return jnp.where(b >= -amplitude * sin_i, peak, at_end)
+    at_end = gap * sin_square + 2 * skew * slant + lift * cos_square
+    return c * c, jnp.where(b >= -amplitude * sin_i, peak, at_end)
 
 
 def _cut(wi, i, canonical_A):
-    return jnp.where(wi[2] > 0, wi[2] / (i.norm * (1 + _largest_q_less_1(wi, canonical_A))), 0)
+    c_square, q = _largest_q(wi, canonical_A)
+    return jnp.where(wi[2] > 0, wi[2] * c_square / (i.norm * (c_square + q)), 0)
 
 
 def bound(wi: Vec3, A: Mat3) -> Scalar:
@@ -48,9 +47,10 @@ def bound(wi: Vec3, A: Mat3) -> Scalar:
     """
     A = canonical(A)
     i = to_sphere(wi, A)
-    q = _largest_q_less_1(wi, A)
+    c_square, q = _largest_q(wi, A)
     # i_z/(‖Aωi‖ Q) − i'_z with i'_z = (e·ωi + i_z)/‖Aωi‖.
-    return jnp.where(wi[2] > 0, -(A[2, 0] * wi[0] + A[2, 1] * wi[1] + wi[2] * (q / (1 + q))) / i.norm, -i.z)
+    fall = A[2, 0] * wi[0] + A[2, 1] * wi[1] + wi[2] * (q / (c_square + q))
+    return jnp.where(wi[2] > 0, -fall / i.norm, -i.z)
 
 
 def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:
