@@ -22,9 +22,12 @@ CHECKS = (
     "heitz2014_exact",
     "walter2014",
     "walter2014_sampling",
+    "walter2014_steps",
     "walter2014_exact",
     "dupuy2023",
+    "dupuy2023_exact",
     "tokuyoshi2024",
+    "tokuyoshi2024_exact",
     "ours",
     "misprints",
 )

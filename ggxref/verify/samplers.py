@@ -37,6 +37,13 @@ def follows(sample, *, law, cases, stream: Stream, numbers: int = 2, thin: int =
     return uniform_square(np.array(v))
 
 
+def second_tangent(w: np.ndarray) -> np.ndarray:
+    """Second row of the frame of Duff et al. 2017, which the library's lune sampler takes at normal incidence."""
+    s = np.copysign(1, w[2])
+    a = -1 / (s + w[2])
+    return np.array([w[0] * w[1] * a, s + w[1] ** 2 * a, -w[1]])
+
+
 def lattice(n: int) -> np.ndarray:
     """`n` points spread evenly over the open unit square (the R2 sequence)."""
     k = np.arange(1, n + 1)[:, None]
