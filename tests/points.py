@@ -215,7 +215,9 @@ def _rotation(rng, n):
 def quantities(rng: Generator, n: int) -> Points:
     """`n` points of every quantity that a public function takes, in float64."""
     alpha_x = log_uniform(rng, 1e-4, 2, n)
-    alpha_y = np.clip(alpha_x * mixture(rng, n, [(1, lambda: np.ones(n)), (3, lambda: log_uniform(rng, 1e-3, 1e3, n))]), 1e-4, 2)
+    alpha_y = np.clip(
+        alpha_x * mixture(rng, n, [(1, lambda: np.ones(n)), (3, lambda: log_uniform(rng, 1e-3, 1e3, n))]), 1e-4, 2
+    )
     alpha = np.stack([alpha_x, alpha_y], axis=-1)
 
     # A = c Q C', C' canonical: C the Cholesky factor of the scatter, e minus the mean slope, from straight to strongly skewed.
@@ -277,7 +279,13 @@ def quantities(rng: Generator, n: int) -> Points:
         "eta": eta,
         "n_i": n_o * eta,
         "n_o": n_o,
-        "cos_i": np.clip(mixture(rng, n, [(4, lambda: rng.uniform(-1, 1, n)), (2, lambda: near_critical), (1, lambda: _share(rng, n))]), -1, 1),
+        "cos_i": np.clip(
+            mixture(
+                rng, n, [(4, lambda: rng.uniform(-1, 1, n)), (2, lambda: near_critical), (1, lambda: _share(rng, n))]
+            ),
+            -1,
+            1,
+        ),
         "k": mixture(rng, n, [(4, lambda: log_uniform(rng, 0.01, 8, n)), (1, lambda: np.zeros(n))]),
         "f0": _share(rng, n),
         "gamma": 1 + log_uniform(rng, 0.1, 100, n),

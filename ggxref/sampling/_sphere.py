@@ -75,7 +75,8 @@ def crescent(along: Scalar, rim: Scalar, i: Incident, sin_theta: Scalar) -> tupl
     near = rim / jnp.where(opposite > 0, opposite, 1)
     below_rim = jnp.where(along > 0, near, opposite)  # half_chord - along
     above_rim = jnp.where(along > 0, opposite, near)  # half_chord + along
-    moved = half_chord * i.fall / 2 + s * along
+    # One quantity twice: its first form cancels towards the horizon and below, its second towards the pole.
+    moved = jnp.where(i.z < 1 / 3, s * above_rim - half_chord * i.z, half_chord * i.fall / 2 + s * along)
     lifted = stable.sqrt(s * below_rim * (half_chord * i.fall + s * above_rim))
     # z = lifted i.z + moved sin_theta; where the terms differ in sign, times its conjugate.
     plus, minus = lifted * i.z, moved * sin_theta

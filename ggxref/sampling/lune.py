@@ -51,7 +51,7 @@ def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:
 
     - `u`: in [0, 1)², (2,). `wi`: unit, (3,), anywhere but where A ω_i points along -A n.
     - `A`: shape matrix, (3, 3), non-singular, of either sign.
-    - Returns a micronormal with density `pdf`: unit, (3,), above the horizon.
+    - Returns a micronormal with density `pdf`: unit, (3,), above the horizon for `u > 0` (0 is the disk's rim).
 
     walter2014 (34)–(46), version 3. Where ω_i = n, (43) leaves e₂ free: it is the second row of `geometry.basis(e3)`.
     """
