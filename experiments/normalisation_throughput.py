@@ -17,8 +17,8 @@ from ggxref.measure.speed import machine
 from ggxref.sampling import normals, spherical_cap
 
 BLOCK = 1 << 18
-WI = np.array([0.6, 0.0, 0.8], np.float32)
-ALPHA = np.array([0.3, 0.1], np.float32)
+WI = jnp.array([0.6, 0.0, 0.8], jnp.float32)
+ALPHA = jnp.array([0.3, 0.1], jnp.float32)
 
 
 @jax.jit

@@ -173,16 +173,20 @@ def chart(
 @app.command(epilog="Example: ggxref choose experiments/scenes/brushed.toml --tolerance 0.01 --figure brushed.png")
 def choose(
     scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Shapes, lights, materials, view.")],
-    tolerance: Annotated[float, typer.Option(help="Most deviation from the richest models, over mean radiance.")] = 0.01,
+    tolerance: Annotated[
+        float, typer.Option(help="Most deviation from the richest models, over mean radiance.")
+    ] = 0.01,
     json: Annotated[Path | None, typer.Option(metavar="PATH", help="Write the findings here too.")] = None,
-    figure: Annotated[Path | None, typer.Option(metavar="PATH.png", help="Cost against deviation, and pictures.")] = None,
+    figure: Annotated[
+        Path | None, typer.Option(metavar="PATH.png", help="Cost against deviation, and pictures.")
+    ] = None,
     pictures: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Richest and chosen picture as PNG and NPY; DIR is made.")
     ] = None,
 ) -> None:
     """Find the cheapest models with which a scene's picture stays within a tolerance of the richest ones'."""
-    from ggxref.scene import image, report
     from ggxref.scene import choose as search
+    from ggxref.scene import image, report
     from ggxref.scene.read import read
 
     for option, path in (("--json", json), ("--figure", figure), ("--pictures", pictures)):

@@ -100,7 +100,7 @@ def test_law_has_the_density(name):
 def test_law_of_the_reflected_cap_has_its_density():
     """With low = -i'_z it is the density of all visible normals of the ellipsoid."""
     A = cases.SHAPES[2]
-    low = -charts.unit(A @ WI) @ charts.unit(A[:, 2])
+    low = -float(charts.unit(A @ WI) @ charts.unit(A[:, 2]))
     m = charts.unit(np.array([[0.1, 0.2, 1.0], [-0.3, 0.1, 1.0], [0.2, -0.5, 1.0]]))
     whole = density_by_differences(lambda x: laws.reflected_cap(x, WI, A, low), m)
     np.testing.assert_allclose(whole, density_by_differences(lambda x: laws.ellipsoid_visible(x, WI, A), m), rtol=1e-7)

@@ -89,7 +89,9 @@ class Table:
                 raise InputError(f"{self.path}: {self._full(key)} is not a known key here; known are {known}")
 
 
-def number(low: float | int = -math.inf, high: float | int = math.inf, *, above: bool = False) -> Callable[[Table, str], float]:
+def number(
+    low: float | int = -math.inf, high: float | int = math.inf, *, above: bool = False
+) -> Callable[[Table, str], float]:
     """A reader of a finite number in [low, high], or with `above` in (low, high]."""
     bracket = "(" if above else "["
     need = "a finite number" if low == -math.inf else f"a number in {bracket}{low:g}, {high:g}]"

@@ -55,7 +55,7 @@ def cases():
 
 
 @dupuy(
-    "(1)", "D_vis = D_vis,std(Mᵀm, M⁻¹wi) |det Mᵀ|/‖Mᵀm‖³", [VNDF, "oracle.jacobian.linear"],
+    "(1)", "D_vis = D_vis,std(Mᵀm, M⁻¹wi) |det Mᵀ|/‖Mᵀm‖³, enclosed", [VNDF, "oracle.jacobian.linear"],
     mutant=("Jacobian to the 4th power", lambda f: lambda m, i, a: f(m, i, a) * a[0]),
 )  # fmt: skip
 def visible_density(pdf, linear):
@@ -239,7 +239,7 @@ def standard_masking(g1, sigma):
 
 
 @dupuy(
-    "(20)", "PDF = D_vis/(4|wa·m|) = G1 D/(4 cos θ_a)", [VNDF, "oracle.jacobian.reflection", "oracle.masking.g1_ggx", "oracle.ndf.ggx"],
+    "(20)", "PDF = D_vis/(4|wa·m|) = G1 D/(4 cos θ_a), enclosed", [VNDF, "oracle.jacobian.reflection", "oracle.masking.g1_ggx", "oracle.ndf.ggx"],
     mutant=("Jacobian lost", lambda f: lambda m, i, a: f(m, i, a) * dot(i, m)),
 )  # fmt: skip
 def density_of_outgoing(pdf, jacobian, g1, D):

@@ -97,7 +97,7 @@ def v_cavity_conserves_area(g1):
 
 @identity(
     "§2.2 reflect", "unit, coplanar, and at the same angle", "oracle.geometry.reflect",
-    mutant=("2 lost", lambda f: lambda w, m: add(scale(dot(w, m), m), scale(-1, w))),
+    mutant=("2 lost", lambda f: lambda w, m: add(scale(dot(w, m), m), scale(arb(-1), w))),
 )  # fmt: skip
 def reflection_law(reflect):
     for i, m in fronts():

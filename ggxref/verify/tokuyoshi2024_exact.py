@@ -223,7 +223,7 @@ def reflected(alpha):
 )  # fmt: skip
 @tokuyoshi(
     "(26)", "z'_o = 2(wi'·wm') z'_m - z'_i, its third component", "oracle.geometry.reflect",
-    mutant=("2 lost", lambda f: lambda w, m: scale(0.5, add(f(w, m), w))),
+    mutant=("2 lost", lambda f: lambda w, m: scale(arb(1) / 2, add(f(w, m), w))),
 )  # fmt: skip
 def reflected_vector(reflect):
     for alpha in ALPHAS:

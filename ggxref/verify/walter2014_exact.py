@@ -379,7 +379,7 @@ def lune_area_product(lune_area, factors):
 
 
 @identity(
-    "(29)", "C_e = √(|A|/(π‖A n‖)) gives A_e⊥(n) = 1", ["oracle.ellipsoid.size", "oracle.ellipsoid.projected_area"],
+    "(29)", "C_e = √(|A|/(π‖A n‖)) gives A_e⊥(n) = 1, enclosed", ["oracle.ellipsoid.size", "oracle.ellipsoid.projected_area"],
     mutant=("‖A n‖ lost", lambda f: lambda A: f(A) * norm(apply(A, N)).sqrt()),
 )  # fmt: skip
 def unit_size(size, projected_area):
