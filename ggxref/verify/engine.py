@@ -19,6 +19,7 @@ CHECKS = (
     "heitz2014",
     "heitz2014_slopes",
     "heitz2014_bsdf",
+    "heitz2014_tables",
     "heitz2014_exact",
     "walter2014",
     "walter2014_sampling",
@@ -29,6 +30,7 @@ CHECKS = (
     "tokuyoshi2024",
     "tokuyoshi2024_exact",
     "ours",
+    "ours_energy",
     "misprints",
 )
 METHODS = ("exact", "certified", "quadrature", "autodiff", "monte_carlo")

@@ -61,4 +61,9 @@ def unlikely_mean(values: np.ndarray, expected: np.ndarray) -> float:
     """Unlikeliness of the means of values (cases, n) about `expected` (cases,), by the central limit theorem."""
     # Values that are all alike have no spread: their mean then has to be exact to rounding.
     error = np.maximum(1e-12, values.std(axis=-1) / np.sqrt(values.shape[-1]))
-    return unlikeliness(2 * stats.norm.sf(np.abs(values.mean(axis=-1) - expected) / error))
+    return unlikely_difference(values.mean(axis=-1) - expected, error)
+
+
+def unlikely_difference(difference: np.ndarray, error: np.ndarray) -> float:
+    """Unlikeliness of normal deviates with mean 0 and that standard error."""
+    return unlikeliness(2 * stats.norm.sf(np.abs(difference) / error))

@@ -19,6 +19,10 @@ ROUNDING = 1e-12
 ABOVE = [(i, a) for i, a in samplers.VISIBLE if i[2] > 0]
 
 
+# With both α above 1 as well, where the minimum with 1 acts.
+WIDTHS = np.concatenate([cases.ALPHAS, [[1.5, 2.0]]])
+
+
 def literal_k(i, alpha):
     """(35), (38), (39), with k = 1 where wi is not above the horizon."""
     a = np.minimum(alpha.min(axis=-1), 1)
@@ -119,7 +123,7 @@ def least_height(bound):
 )  # fmt: skip
 def support_is_kept(bound, pdf):
     o = np.concatenate([cases.hemisphere(1500), horizon(360)])
-    i, o, alpha = cases.triples(cases.UP, o, cases.ALPHAS)
+    i, o, alpha = cases.triples(cases.UP, o, WIDTHS)
     lost = -bound(i, alpha) * warp(i, alpha)[:, 2] - reflected_height(i, o, alpha)
     above = o[:, 2] > 0  # the horizon itself is the edge, where rounding decides
     return max(worst(np.maximum(0, lost)), float(np.any(pdf(unit(i + o), i, alpha)[above] <= 0)))
@@ -130,7 +134,7 @@ def support_is_kept(bound, pdf):
     tolerance=ROUNDING, mutant=("α = α_x", lambda f: lambda i, a: literal_k(i, a[..., :1])),
 )  # fmt: skip
 def bound_formula(bound):
-    i, alpha = cases.pairs(cases.ALL, cases.ALPHAS)
+    i, alpha = cases.pairs(cases.ALL, WIDTHS)
     k = bound(i, alpha)
     return max(worst(k - literal_k(i, alpha)), worst(np.maximum(0, k - 1)), worst(np.minimum(0, k)))
 
