@@ -59,6 +59,10 @@ def verify(
     equation: Annotated[str | None, typer.Option(metavar="N", help="Only those of this equation or place.")] = None,
     samples: Annotated[int, typer.Option(help="Random numbers per case of a statistical check.", min=1 << 12)] = 1
     << 16,
+    mutants: Annotated[
+        bool,
+        typer.Option("--mutants", help="Put wrong formulas in the library's place and show which check kills each."),
+    ] = False,
     json: Annotated[Path | None, typer.Option(metavar="PATH", help="Write the records and errata here too.")] = None,
 ) -> None:
     """Prove the formulas numerically, each beside a wrong one that must fail."""
@@ -67,6 +71,10 @@ def verify(
     if json and not json.parent.is_dir():
         raise InputError(f"--json: {json} cannot be written: there is no directory {json.parent}")
     checks = engine.select(engine.registered(), paper, equation)
+    if mutants:
+        if paper or equation:
+            raise InputError("--mutants: takes all checks; leave out --paper and --equation")
+        return _hunt(checks, samples, json)
     start, records = perf_counter(), []
     with _progress("checks", len(checks)) as advance:
         for record in engine.run(checks, samples):
@@ -77,6 +85,23 @@ def verify(
     if json:
         write_atomically(json, report.document(records, errata.found(records), seconds))
     if not all(r.good for r in records):
+        raise typer.Exit(1)
+
+
+def _hunt(checks: list, samples: int, json: Path | None) -> None:
+    """Put each mutant in the library's place; exit code 1 if one lives."""
+    from ggxref.verify import mutants, report
+
+    start, verdicts = perf_counter(), []
+    with _progress("mutants", len(mutants.MUTANTS)) as advance:
+        for each in mutants.MUTANTS:
+            verdicts.append(mutants.hunt(each, checks, samples))
+            advance(1)
+    seconds = perf_counter() - start
+    report.show_hunt(verdicts, seconds)
+    if json:
+        write_atomically(json, report.hunt_document(verdicts, seconds))
+    if not all(v.killer for v in verdicts):
         raise typer.Exit(1)
 
 

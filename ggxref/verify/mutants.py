@@ -5,6 +5,7 @@ the wrong direction, one α for two, separable for correlated, limits of the wro
 """
 
 import importlib
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,16 +14,17 @@ from functools import wraps
 import jax.numpy as jnp
 
 from ggxref.verify import batch
-from ggxref.verify.engine import Check
+from ggxref.verify.engine import METHODS, Check
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A wrong form of the function of that public name."""
+    """A wrong form of the function of that public name; `through`: the public function that shows it, if no check calls it."""
 
     target: str
     name: str
     change: Callable
+    through: str = ""
 
     @contextmanager
     def installed(self) -> Iterator[None]:
@@ -45,19 +47,36 @@ class Verdict:
 
     mutant: Mutant
     killer: Check | None
-    error: float = 0.0
+    error: float
+    seconds: float
+
+
+def suspects(mutant: Mutant, checks: Sequence[Check]) -> list[Check]:
+    """The checks that may notice, those of the function itself before all others that call the library.
+
+    Identities go first, being cheap and sharp, and samples last.
+    """
+
+    def rank(check):
+        own = mutant.target in check.functions or mutant.through in check.functions
+        return not own, METHODS.index(check.method), len(check.functions)
+
+    return sorted((c for c in checks if any(_of_library(f) for f in c.functions)), key=rank)
+
+
+def _of_library(function):
+    return isinstance(function, str) and not function.startswith("oracle.")
 
 
 def hunt(mutant: Mutant, checks: Sequence[Check], samples: int) -> Verdict:
-    """Run the checks on the mutated library, those of the function itself first, until one fails."""
-    own = [c for c in checks if mutant.target in c.functions]
-    others = [c for c in checks if mutant.target not in c.functions]
+    """Run the suspects on the mutated library until one fails."""
+    start = time.perf_counter()
     with mutant.installed():
-        for each in [*own, *others]:
+        for each in suspects(mutant, checks):
             error = each.error(samples)
             if not error <= each.tolerance:
-                return Verdict(mutant, each, error)
-    return Verdict(mutant, None)
+                return Verdict(mutant, each, error, time.perf_counter() - start)
+    return Verdict(mutant, None, 0.0, time.perf_counter() - start)
 
 
 def swap(v):
@@ -111,8 +130,8 @@ MUTANTS = [
     Mutant("slopes.from_normal", "sign lost", lambda f: lambda wm: -f(wm)),
     Mutant("slopes.to_normal", "not normalised", lambda f: lambda slope: f(slope) / f(slope)[2]),
     Mutant("slopes.stretch", "divided", lambda f: lambda w, factors: f(w, 1 / factors)),
-    Mutant("slopes.sigma_ggx", "|z| for z", lambda f: lambda w, alpha: f(w.at[2].set(jnp.abs(w[2])), alpha)),
-    Mutant("slopes.sigma_beckmann", "axes swapped", lambda f: lambda w, alpha: f(w, swap(alpha))),
+    Mutant("slopes.sigma_ggx", "|z| for z", lambda f: lambda w, alpha: f(w.at[2].set(jnp.abs(w[2])), alpha), "sampling.slope_ggx.pdf"),
+    Mutant("slopes.sigma_beckmann", "axes swapped", lambda f: lambda w, alpha: f(w, swap(alpha)), "sampling.slope_beckmann.pdf"),
     # masking
     Mutant("masking.lambda_ggx", "without the half", lambda f: lambda w, alpha: 2 * f(w, alpha)),
     Mutant("masking.lambda_ggx", "axes swapped", lambda f: lambda w, alpha: f(w, swap(alpha))),

@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ggxref.verify.engine import Record
+from ggxref.verify.mutants import Verdict
 
 
 def table(records: Sequence[Record]) -> Table:
@@ -31,15 +32,31 @@ def table(records: Sequence[Record]) -> Table:
     return drawn
 
 
+def hunt_table(verdicts: Sequence[Verdict]) -> Table:
+    """One row a mutant: what was put in the formula's place, and the check that killed it."""
+    drawn = Table(box=None, pad_edge=False, header_style="bold")
+    for name in ("", "function", "mutant", "killed by"):
+        drawn.add_column(name, overflow="fold")
+    for name in ("error", "tolerance", "s"):
+        drawn.add_column(name, justify="right", no_wrap=True)
+    for v in verdicts:
+        row = v.mutant.target, Text(v.mutant.name)
+        if v.killer:
+            by = Text(f"{v.killer.paper} {v.killer.equation}, {v.killer.method}: {v.killer.statement}")
+            numbers = f"{v.error:.1e}", f"{v.killer.tolerance:.0e}", f"{v.seconds:.1f}"
+            drawn.add_row(Text("killed", style="green"), *row, by, *numbers)
+        else:
+            drawn.add_row(Text("ALIVE", style="bold red"), *row, "", "", "", f"{v.seconds:.1f}")
+    return drawn
+
+
 # Columns of the table where the output is a file or a pipe, whose width is unknown.
 WIDTH = 160
 
 
 def show(records: Sequence[Record], seconds: float) -> None:
     """Print the table, what went wrong, and the sum."""
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=WIDTH)
+    console = _console()
     console.print(table(records))
     console.print()
     for r in records:
@@ -51,6 +68,19 @@ def show(records: Sequence[Record], seconds: float) -> None:
         f"{len(records)} checks: {len(records) - failed} pass, {failed} fail; "
         f"{len(records) - missed} controls caught, {missed} not; {seconds:.0f} s"
     )
+
+
+def show_hunt(verdicts: Sequence[Verdict], seconds: float) -> None:
+    """Print which check killed each mutant, and the sum."""
+    console = _console()
+    console.print(hunt_table(verdicts))
+    killed = sum(v.killer is not None for v in verdicts)
+    console.print(f"\n{len(verdicts)} mutants: {killed} killed, {len(verdicts) - killed} alive; {seconds:.0f} s")
+
+
+def _console() -> Console:
+    console = Console()
+    return console if console.is_terminal else Console(width=WIDTH)
 
 
 def problems(r: Record) -> list[str]:
@@ -67,6 +97,26 @@ def document(records: Sequence[Record], errata: Sequence[dict], seconds: float) 
     """The JSON of design.md; an error that is not finite is null."""
     checks = [{k: v for k, v in asdict(r).items() if k != "failure"} for r in records]
     value = {"version": version("ggxref"), "seconds": seconds, "checks": checks, "errata": list(errata)}
+    return json.dumps(_finite(value), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def hunt_document(verdicts: Sequence[Verdict], seconds: float) -> str:
+    """The mutants and their killers as JSON."""
+    rows = []
+    for v in verdicts:
+        by = v.killer and {
+            name: getattr(v.killer, name) for name in ("paper", "equation", "statement", "method", "tolerance")
+        }
+        rows.append(
+            {
+                "function": v.mutant.target,
+                "mutant": v.mutant.name,
+                "killed_by": by,
+                "error": v.error,
+                "seconds": v.seconds,
+            }
+        )
+    value = {"version": version("ggxref"), "seconds": seconds, "mutants": rows}
     return json.dumps(_finite(value), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
