@@ -10,6 +10,7 @@ import numpy as np
 
 from ggxref import bsdf, ellipsoid, fresnel, geometry, masking, ndf
 from ggxref.fit import solver
+from ggxref.fit.readers import rgl
 
 PIXEL = 1e-6
 HEADER = "# zenith_i azimuth_i zenith_o azimuth_o brdf\n"
@@ -125,3 +126,46 @@ def npy(heights: np.ndarray) -> bytes:
 def write(path: Path, content: str | bytes) -> Path:
     path.write_bytes(content.encode() if isinstance(content, str) else content)
     return path
+
+
+def tensor_file(fields: dict[str, np.ndarray]) -> bytes:
+    """An RGL tensor file of these fields."""
+    codes = {"u1": 1, "f4": 10, "f8": 11}
+    names = {name: name.encode() for name in fields}
+    start = 18 + sum(2 + len(name) + 2 + 1 + 8 + 8 * fields[key].ndim for key, name in names.items())
+    header, data = [b"tensor_file\0\x01\x00", len(fields).to_bytes(4, "little")], []
+    for key, name in names.items():
+        array = np.ascontiguousarray(fields[key])
+        header += [len(name).to_bytes(2, "little"), name, array.ndim.to_bytes(2, "little")]
+        header += [bytes([codes[array.dtype.str[1:]]]), (start + sum(map(len, data))).to_bytes(8, "little")]
+        header += [size.to_bytes(8, "little") for size in array.shape]
+        data.append(array.tobytes())
+    return b"".join(header + data)
+
+
+def rgl_fields(theta_i=(0.0, 30.0, 60.0, 85.0), grid=9) -> dict[str, np.ndarray]:
+    """A matte material, f = (0.1, 0.2, 0.3), measured at micronormals spread by a density that is not even."""
+    zeniths = np.radians(theta_i).astype("f4")
+    x, y = np.meshgrid(np.linspace(0, 1, 16), np.linspace(0, 1, 12))
+    density = (0.3 + x + 0.2 * np.sin(2 * np.pi * y)).astype("f4")
+    u, v = (axis.ravel() for axis in np.meshgrid(np.linspace(0, 1, grid), np.linspace(0, 1, grid)))
+    at_x, at_y = rgl.invert(density.astype(float), u, v)
+    wm = direction(at_x**2 * np.pi / 2, (2 * at_y - 1) * np.pi)
+    ndf = np.tile(np.linspace(2, 1, 128), (2, 1)).astype("f4")
+    rgb = np.empty((1, len(zeniths), 3, grid, grid), "f4")
+    for k, zenith in enumerate(zeniths):
+        wi = direction(zenith, 0.0)
+        wo_z = 2 * (wm @ wi) * wm[:, 2] - wi[2]
+        scale = rgl.bilinear(ndf.astype(float), at_x, at_y) / 4
+        rgb[0, k] = ((np.array([[0.1], [0.2], [0.3]]) * wo_z) / scale).reshape(3, grid, grid)
+    return {
+        "phi_i": np.zeros(1, "f4"), "theta_i": zeniths, "ndf": ndf, "sigma": np.ones((2, 128), "f4"),
+        "vndf": np.tile(density, (1, len(zeniths), 1, 1)), "rgb": rgb,
+    }  # fmt: skip
+
+
+def merl(value, sizes=(90, 90, 180)) -> bytes:
+    """A MERL binary of one value per colour, [1/sr]."""
+    scales = np.array([[1.0], [1.15], [1.66]]) / 1500
+    planes = np.broadcast_to(np.asarray(value, float)[:, None] / scales, (3, int(np.prod(sizes))))
+    return np.array(sizes, "<i4").tobytes() + planes.astype("<f8").tobytes()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ggxref.errors import InputError
 from ggxref.fit.data import Heights, Reflectance, Source
-from ggxref.fit.readers import array, matrix, table, x3p
+from ggxref.fit.readers import array, astm, matrix, merl, rgl, table, x3p
 
 LARGEST_FILE = 2**31
 """Bytes. The largest measurement known here, a MERL material, has 33 MB."""
@@ -14,8 +14,11 @@ LARGEST_FILE = 2**31
 Format = tuple[str, Callable[[bytes], bool], Callable[..., Reflectance | Heights]]
 
 FORMATS: tuple[Format, ...] = (
+    ("rgl", rgl.recognise, rgl.parse),
+    ("merl", merl.recognise, merl.parse),
     ("x3p", x3p.recognise, x3p.parse),
     ("npy", array.recognise, array.parse),
+    ("astm", astm.recognise, astm.parse),
     ("text matrix", matrix.recognise, matrix.parse),
     ("table", table.recognise, table.parse),
 )
