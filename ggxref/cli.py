@@ -138,12 +138,19 @@ def vectors(
 def fit(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A BRDF or a height field; its format is recognised.")],
     model: Annotated[
-        str, typer.Option(help="isotropic, anisotropic, rotated or ellipsoid; auto fits all and chooses.")
+        str,
+        typer.Option(help="Shapes to try: isotropic, anisotropic, rotated, ellipsoid, separated by commas; or all."),
     ] = "auto",
+    tail: Annotated[
+        str, typer.Option(help="Tails to try: ggx, beckmann, student_t; auto is ggx and student_t, its tail free.")
+    ] = "auto",
+    masking: Annotated[str, typer.Option(help="BRDF: height_correlated, separable or v_cavity.")] = "height_correlated",
+    fresnel: Annotated[str, typer.Option(help="BRDF: schlick (F0) or conductor (eta, k).")] = "schlick",
     fix: Annotated[
         list[str] | None, typer.Option(metavar="NAME=VALUE", help="Hold a parameter: alpha=0.1, diffuse=0, A=a,b,…")
     ] = None,
     min_cosine: Annotated[float, typer.Option(help="BRDF: leave out directions nearer to the horizon.")] = 0.05,
+    samples: Annotated[int, typer.Option(help="BRDF: fit at most this many, evenly through the file.")] = 4096,
     level: Annotated[int, typer.Option(help="Heights: degree of the polynomial that is taken off first.")] = 1,
     pixel: Annotated[
         str | None, typer.Option(metavar="DX[,DY]", help="Heights: pixel size in metres, if FILE does not say it.")
@@ -162,11 +169,12 @@ def fit(
             from ggxref.fit import figures
 
             figures.check(figure)
-        chosen = {"model": model, "fixed": options.fixed(fix or []), "min_cosine": min_cosine, "degree": level}
-        ladder = fitting.fit(readers.read(file, pixel=options.pixel(pixel)), **chosen)
+        given = {"model": model, "tail": tail, "masking": masking, "fresnel": fresnel, "min_cosine": min_cosine}
+        given |= {"samples": samples, "degree": level, "fixed": options.fixed(fix or [])}
+        ladder = fitting.fit(readers.read(file, pixel=options.pixel(pixel)), **given)
         console.print(report.tables(ladder))
         if json:
-            write_atomically(json, dumps(report.document(ladder, chosen), indent=1) + "\n")
+            write_atomically(json, dumps(report.document(ladder, given), indent=1) + "\n")
         if figure:
             write_atomically(figure, figures.draw(ladder, figure.suffix))
     if ladder.best.trouble:

@@ -37,7 +37,7 @@ def surface(folder):
 
 @pytest.fixture(scope="module")
 def lobes(table, folder):
-    return run(table, "--json", folder / "lobes.json", "--figure", folder / "lobes.png")
+    return run(table, "--tail", "ggx", "--json", folder / "lobes.json", "--figure", folder / "lobes.png")
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def test_heights(density):
 def test_json_repeats_the_fit(lobes, density, folder, table):
     lobe = json.loads((folder / "lobes.json").read_text())
     assert lobe["schema"] == "ggxref-fit-1" and lobe["kind"] == "reflectance" and lobe["chosen"] == "isotropic"
-    assert lobe["options"] == {"model": "auto", "fixed": {}, "min_cosine": 0.05, "degree": 1}
+    assert lobe["options"]["tail"] == "ggx" and lobe["options"]["min_cosine"] == 0.05 and lobe["options"]["fixed"] == {}
     assert lobe["source"]["path"] == str(table) and len(lobe["source"]["sha256"]) == 64
     best = lobe["models"][0]
     assert best["converged"] and best["parameters"]["alpha"]["free"]
@@ -95,6 +95,9 @@ def test_a_figure_shows_the_chosen_model_and_one_to_compare(surface):
         (["nothing.csv"], "nothing.csv: no such file"),
         (["metal.csv", "--model", "phong"], "model 'phong'; need auto or one of isotropic"),
         (["metal.csv", "--model", "rotated"], "cannot tell it from a smaller one"),
+        (["metal.csv", "--tail", "cauchy"], "tail 'cauchy'; need auto or one of ggx"),
+        (["metal.csv", "--masking", "none"], "masking 'none'; need one of height_correlated"),
+        (["metal.csv", "--fresnel", "none"], "fresnel 'none'; need one of schlick"),
         (["metal.csv", "--fix", "alpha=0"], "alpha_x = 0; need a positive number"),
         (["metal.csv", "--fix", "alpha=-1"], "alpha_x = -1; need a positive number"),
         (["metal.csv", "--fix", "alpha=wide"], "--fix alpha: got 'wide'"),
@@ -124,7 +127,7 @@ def test_a_fit_that_found_nothing_exits_with_1(folder):
     """A diffuse surface has no lobe to fit."""
     flat = fit_data.write(folder / "flat.csv", fit_data.table(PLANE, np.full(len(PLANE), 0.1)))
     try:
-        result = run(flat, "--model", "isotropic")
+        result = run(flat, "--model", "isotropic", "--tail", "ggx")
     finally:
         flat.unlink()
     assert result.exit_code == 1, result.output
@@ -132,7 +135,7 @@ def test_a_fit_that_found_nothing_exits_with_1(folder):
 
 
 def test_a_whole_shape_can_be_held(surface):
-    result = run(surface, "--model", "ellipsoid", "--fix", "A=0.2,0.01,0,0,0.1,0,0.05,0,1")
+    result = run(surface, "--model", "ellipsoid", "--tail", "ggx", "--fix", "A=0.2,0.01,0,0,0.1,0,0.05,0,1")
     assert result.exit_code == 0, result.output
     assert "held" in result.output
 

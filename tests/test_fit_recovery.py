@@ -1,17 +1,20 @@
 """Fits of synthetic measurements find the parameters that made them, know how sure they are, and choose that model."""
 
+from typing import cast
+
 import fit_data
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from ggxref.errors import InputError
-from ggxref.fit import models, selection, solver
+from ggxref.fit import models, parameters, selection, solver
 from ggxref.fit.data import Heights, Reflectance, Source, direction
 from ggxref.fit.fitting import fit, fit_models
+from ggxref.fit.models import Surface
 from ggxref.fit.problem import from_reflectance, from_slopes
 from ggxref.fit.slopes import TILES, Slopes
-from ggxref.fit.uncertainty import Curvature, spread
+from ggxref.fit.uncertainty import Curvature, curvature, spread
 
 SURE = 4.0
 """Standard errors that a seeded estimate may be off: 6e-5 by chance where it is unbiased and its error right."""
@@ -52,12 +55,15 @@ def reflectance(model, degrees, noise=0.1, seed=1):
     )
 
 
-def slopes(model, count=8192, seed=1):
-    """Independent slopes: a normal over the root of an exponential is the Student-t of the ellipsoid NDF."""
+def slopes(model, count=8192, seed=1, gamma=2.0):
+    """Independent slopes: a normal over the root of a gamma variable is Student-t; of an exponential one, GGX."""
     random = np.random.default_rng(seed)
     normal = random.normal(size=(count, 2)) @ np.linalg.cholesky(SCATTER[model]).T / np.sqrt(2)
-    heavy = normal / np.sqrt(random.exponential(size=(count, 1)))
+    heavy = normal / np.sqrt(random.gamma(gamma - 1, 1 / (gamma - 1), size=(count, 1)))
     return Slopes(heavy + MEAN[model], np.arange(count) % TILES**2, 0)
+
+
+GGX = parameters.ladder(parameters.SHAPES, ["ggx"])
 
 
 def assert_recovers(found, expected):
@@ -75,17 +81,17 @@ def model(request):
 
 @pytest.fixture(scope="module")
 def ladder(model):
-    return fit(reflectance(model, fit_data.angles()))
+    return fit(reflectance(model, fit_data.angles()), tail="ggx")
 
 
 class TestReflectance:
     def test_recovery(self, ladder, model):
-        found = next(fit for fit in ladder.fits if fit.model == model)
+        found = next(fit for fit in ladder.fits if fit.model.name == model)
         assert not found.trouble
         assert_recovers(found, truth(model) | {"f0": 0.6, "diffuse": 0.1})
 
     def test_the_noise_is_what_is_left(self, ladder, model):
-        found = next(fit for fit in ladder.fits if fit.model == model)
+        found = next(fit for fit in ladder.fits if fit.model.name == model)
         # 960 samples: the root mean square of a normal is sure to 1/sqrt(2 n), 2.3 %.
         assert found.log_rmse == pytest.approx(0.1, rel=SURE * 0.023)
 
@@ -98,13 +104,13 @@ class TestReflectance:
 
 @pytest.fixture(scope="module")
 def fits(model):
-    return fit_models(from_slopes(slopes(model)), list(SCATTER), {})
+    return fit_models(from_slopes(slopes(model)), GGX, {})
 
 
 def log_loss(found, points):
     """Mean -log density of slopes under a fit."""
     with solver.float64():
-        return -np.mean(np.log(models.slope_densities(found.theta, points.T)))
+        return -np.mean(np.log(models.slope_densities(found.theta, points.T, found.tail)))
 
 
 class TestSlopes:
@@ -115,14 +121,16 @@ class TestSlopes:
         assert_recovers(found, truth(model))
 
     def test_the_model_that_made_it_is_chosen(self, fits, model):
-        assert selection.choose([f.model for f in fits], np.stack([f.held_out for f in fits])) == model
+        assert selection.choose([f.model.name for f in fits], np.stack([f.held_out for f in fits])) == model
 
     def test_the_fold_left_out_is_as_if_fitted_without(self, fits, model):
         """The one Newton step of `held_out` against a fit of the other folds."""
         surface = slopes(model)
         problem = from_slopes(surface)
         others = problem.fold != 3
-        refitted = fit_models(from_slopes(Slopes(surface.slopes[others], surface.tile[others], 0)), [model], {})[0]
+        kept = surface.slopes[others]
+        again = Slopes(kept, np.arange(len(kept)) % TILES**2, 0)
+        refitted = fit_models(from_slopes(again), [GGX[list(SCATTER).index(model)]], {})[0]
         left_out, found = surface.slopes[~others], fits[list(SCATTER).index(model)]
         expected, whole = log_loss(refitted, left_out), log_loss(found, left_out)
         # Second order in the fold's pull, which is a few percent of θ: a twentieth of what leaving the fold out changes.
@@ -134,8 +142,8 @@ class TestPlane:
 
     def test_recovery(self):
         data = reflectance("isotropic", fit_data.plane_angles())
-        ladder = fit(data)
-        assert [fit.model for fit in ladder.fits] == ["isotropic", "ellipsoid"]
+        ladder = fit(data, tail="ggx")
+        assert [fit.model.name for fit in ladder.fits] == ["isotropic", "ellipsoid"]
         assert ladder.chosen == "isotropic"
         assert_recovers(ladder.best, truth("isotropic") | {"f0": 0.6, "diffuse": 0.1})
 
@@ -146,7 +154,8 @@ class TestPlane:
         turned = Reflectance(
             data.wi @ turn, data.wo @ turn, data.values, data.weights, data.mask, data.bands, data.source
         )
-        problem, expected = from_reflectance(turned), from_reflectance(data)
+        options = cast(dict, {"min_cosine": 0.05, "most": 4096})
+        problem, expected = from_reflectance(turned, Surface(), **options), from_reflectance(data, Surface(), **options)
         assert_allclose(problem.samples[0], expected.samples[0], atol=1e-12)
         assert any("azimuth 40.11°" in note for note in problem.notes)
 
@@ -171,6 +180,7 @@ class TestFixed:
             ("auto", {"roughness": 0.1}, "no parameter 'roughness' to fix"),
             ("auto", {"alpha": 0.0}, "alpha_x = 0; need a positive number"),
             ("ggx", {}, "model 'ggx'; need auto or one of isotropic"),
+            ("isotropic", {"gamma": 1.2}, "gamma = 1.2; need a number above 1.5"),
         ],
     )
     def test_what_cannot_be_held(self, model, fixed, said):
@@ -185,7 +195,7 @@ class TestTrouble:
         flat = Reflectance(
             data.wi, data.wo, np.full_like(data.values, 0.1), data.weights, data.mask, data.bands, data.source
         )
-        assert fit(flat, model="anisotropic").best.trouble
+        assert fit(flat, model="anisotropic", tail="ggx").best.trouble
 
     def test_too_few_samples(self):
         data = reflectance("isotropic", fit_data.angles()[:20])
@@ -200,34 +210,76 @@ class TestTrouble:
         with pytest.raises(InputError, match="need"):
             fit(heights, **{option: value})
 
+    @pytest.mark.parametrize("option", ["tail", "masking", "fresnel"])
+    def test_unknown_names(self, option):
+        with pytest.raises(InputError, match=f"{option} 'none'; need"):
+            fit(reflectance("isotropic", fit_data.angles()), **cast(dict, {option: "none"}))
+
+
+class TestTails:
+    @pytest.mark.parametrize(("gamma", "name"), [(2.0, "rotated"), (3.5, "rotated student_t")])
+    def test_the_tail_is_found(self, gamma, name):
+        ladder = parameters.ladder({"rotated": parameters.SHAPES["rotated"]}, ["ggx", "student_t"])
+        fits = fit_models(from_slopes(slopes("rotated", gamma=gamma)), ladder, {})
+        assert_recovers(fits[1], truth("rotated") | {"gamma": gamma})
+        assert selection.choose([f.model.name for f in fits], np.stack([f.held_out for f in fits])) == name
+
+    def test_beckmann_is_found(self):
+        ladder = parameters.ladder({"rotated": parameters.SHAPES["rotated"]}, ["ggx", "beckmann"])
+        fits = fit_models(from_slopes(slopes("rotated", gamma=1e9)), ladder, {})
+        assert_recovers(fits[1], truth("rotated"))
+        assert (
+            selection.choose([f.model.name for f in fits], np.stack([f.held_out for f in fits])) == "rotated beckmann"
+        )
+
+    def test_the_free_tail_holds_ggx(self):
+        """One formula serves both: at γ = 2 it is the other, digit for digit or nearly."""
+        problem = from_slopes(slopes("anisotropic"))
+        alone = fit_models(problem, GGX[1:2], {})[0]
+        ladder = parameters.ladder({"anisotropic": parameters.SHAPES["anisotropic"]}, ["ggx", "student_t"])
+        assert fit_models(problem, ladder, {})[0].loss == pytest.approx(alone.loss, rel=1e-12)
+
 
 class TestSpread:
+    def space(self, size):
+        return parameters.Space(np.zeros(size), np.eye(size))
+
     def test_least_squares_of_a_line(self):
         """For a straight line with independent noise the sandwich is the textbook's covariance."""
         random = np.random.default_rng(3)
         x = np.linspace(-1, 1, 4000)
         design = np.stack([np.ones_like(x), x], axis=1)
-        residual = 0.3 * random.normal(size=len(x))
-        scores = -design * residual[:, None]
-        at = Curvature(design.T @ design, scores - scores.mean(axis=0))
+        y = design @ [0.2, 0.5] + 0.3 * random.normal(size=len(x))
+        best = np.linalg.lstsq(design, y)[0]
+        at = curvature(lambda theta: (y - design @ theta) ** 2 / 2, best, self.space(2))
+        assert_allclose(at.hessian, design.T @ design, atol=1e-5 * len(x))
         expected = 0.3**2 * np.linalg.inv(design.T @ design)
         # 4000 squares of normals are sure to sqrt(2/4000), 2.2 %.
-        assert_allclose(spread(at, np.eye(2)).covariance, expected, atol=SURE * 0.022 * expected.max())
+        assert_allclose(spread(at, self.space(2)).covariance, expected, atol=SURE * 0.022 * expected.max())
+
+    def test_differences_are_derivatives(self):
+        random = np.random.default_rng(4)
+        place, matrix = random.normal(size=3), random.normal(size=(3, 3))
+        at = curvature(lambda theta: np.exp(matrix @ theta), place, self.space(3))
+        each = np.exp(matrix @ place)
+        # Relative to the largest: STEP² is 1e-6, and the derivatives' own growth is of order 1.
+        assert_allclose(at.scores, matrix * each[:, None], atol=1e-5 * np.abs(at.scores).max())
+        assert_allclose(at.hessian, (matrix.T * each) @ matrix, atol=1e-5 * np.abs(at.hessian).max())
 
     def test_blocks_that_move_together_widen_it(self):
         scores = np.random.default_rng(4).normal(size=(500, 1))
-        one = spread(Curvature(np.eye(1), scores), np.eye(1)).covariance
-        together = spread(Curvature(np.eye(1), 4 * scores), np.eye(1)).covariance
+        one = spread(Curvature(np.eye(1), scores), self.space(1)).covariance
+        together = spread(Curvature(np.eye(1), 4 * scores), self.space(1)).covariance
         assert_allclose(together, 16 * one)
 
     def test_a_valley_is_no_point(self):
         flat = Curvature(np.diag([1.0, 0.0]), np.random.default_rng(5).normal(size=(50, 2)))
-        assert not spread(flat, np.eye(2)).point
+        assert not spread(flat, self.space(2)).point
 
     def test_a_gradient_left_over_shows(self):
         scores = np.random.default_rng(6).normal(size=(50, 1))
-        assert spread(Curvature(np.eye(1) * 50, scores - scores.mean()), np.eye(1)).newton < 1e-9
-        assert spread(Curvature(np.eye(1) * 50, scores + 1), np.eye(1)).newton > 1
+        assert spread(Curvature(np.eye(1) * 50, scores - scores.mean()), self.space(1)).newton < 1e-9
+        assert spread(Curvature(np.eye(1) * 50, scores + 1), self.space(1)).newton > 1
 
 
 class TestChoose:
@@ -237,11 +289,3 @@ class TestChoose:
         assert selection.choose(["small", "large"], np.stack([near, best])) == "small"
         # Folds that all say the same are sure, however much they differ from one another.
         assert selection.choose(["small", "large"], np.stack([far, best])) == "large"
-
-
-def test_lanes_are_filled_up_and_cut():
-    """More lanes than a call takes, and not a multiple of it: the answers come back in order."""
-    data = from_slopes(slopes("anisotropic"))
-    fits = fit_models(data, ["isotropic", "anisotropic"] * 3, {})
-    assert len(fits) * len(data.starts) % solver.LANES
-    assert [f.loss for f in fits[::2]] == [fits[0].loss] * 3 and [f.loss for f in fits[1::2]] == [fits[1].loss] * 3

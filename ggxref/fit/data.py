@@ -23,7 +23,7 @@ class Reflectance:
     - `wi`, `wo`: (n, 3), unit, on or above the horizon.
     - `values`: (n, bands), the BRDF f [1/sr].
     - `weights`: (n,), positive; `mask`: (n,), True where the sample may be used.
-    - `bands`: their names. `excluded`: why samples are masked, and how many.
+    - `bands`: their names. `counts`: what was done to how many samples, and why.
     """
 
     wi: np.ndarray
@@ -33,7 +33,7 @@ class Reflectance:
     mask: np.ndarray
     bands: tuple[str, ...]
     source: Source
-    excluded: dict[str, int] = field(default_factory=dict)
+    counts: dict[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

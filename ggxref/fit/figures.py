@@ -2,6 +2,7 @@
 
 import io
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from ggxref.errors import InputError
 from ggxref.fit import models, solver
 from ggxref.fit.data import Reflectance
 from ggxref.fit.fitting import Fit, Ladder
+from ggxref.fit.models import Surface
 
 SUFFIXES = (".pdf", ".png", ".svg")
 MEASURED = "0.55"
@@ -45,7 +47,7 @@ def shown(ladder: Ladder) -> list[Fit]:
 
 
 def _lobes(ladder: Ladder) -> Figure:
-    wi, wo, wm, measured, _ = ladder.problem.samples
+    (wi, wo, wm, measured, _), surface = ladder.problem.samples, ladder.problem.surface or Surface()
     order = np.argsort(-wi[2], kind="stable")
     directions, first = np.unique(np.round(wi.T[order], 6), axis=0, return_index=True)
     directions = directions[np.argsort(first)][:MOST_PANELS]
@@ -60,9 +62,8 @@ def _lobes(ladder: Ladder) -> Figure:
         along = np.argsort(angle)
         handles = axes.plot(angle, measured[:, members].T, ".", ms=2, mew=0, color=MEASURED, label="measured")[:1]
         for fit, style in zip(shown(ladder), STYLES, strict=False):
-            with solver.float64():
-                model = models.brdfs(fit.theta, wi[:, members], wo[:, members], wm[:, members])
-            handles += axes.plot(angle[along], model[:, along].T, lw=1, label=fit.model, **style)[:1]
+            model = _model(fit, surface, wi[:, members], wo[:, members], wm[:, members])
+            handles += axes.plot(angle[along], model[:, along].T, lw=1, label=fit.model.name, **style)[:1]
         zenith = math.degrees(math.acos(min(direction[2], 1)))
         axes.set_title(rf"$\theta_i = {zenith:.4g}°$", fontsize=8)
         axes.axvline(zenith, color="0.8", lw=0.6, zorder=0)
@@ -77,6 +78,11 @@ def _lobes(ladder: Ladder) -> Figure:
         handles=handles, loc="outside upper center", ncols=len(handles), fontsize=8, frameon=False, markerscale=3
     )
     return figure
+
+
+def _model(fit: Fit, surface: Surface, wi: np.ndarray, wo: np.ndarray, wm: np.ndarray) -> np.ndarray:
+    with solver.float64():
+        return models.brdfs(fit.theta, wi, wo, wm, replace(surface, tail=fit.tail))
 
 
 def _signed_zenith(wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
@@ -108,14 +114,14 @@ def _slopes(ladder: Ladder) -> Figure:
         axes.tick_params(labelsize=7)
     handles = [Line2D([], [], color=CONTOUR, lw=0.8), Line2D([], [], color=MEASURED, ls="", marker=".")]
     handles += [Line2D([], [], lw=1, **style) for _, style in zip(fitted, STYLES, strict=False)]
-    labels = ["measured (contours)", "measured (marginals)", *(fit.model for fit, _ in fitted)]
+    labels = ["measured (contours)", "measured (marginals)", *(fit.model.name for fit, _ in fitted)]
     figure.legend(handles, labels, loc="outside upper center", ncols=len(handles), fontsize=8, frameon=False)
     return figure
 
 
 def _density(fit: Fit, grid: np.ndarray) -> np.ndarray:
     with solver.float64():
-        return models.slope_densities(fit.theta, grid.reshape(2, -1)).reshape(grid.shape[1:])
+        return models.slope_densities(fit.theta, grid.reshape(2, -1), fit.tail).reshape(grid.shape[1:])
 
 
 DECADES = (2.0, 1.5, 1.0, 0.5, 0.2)

@@ -1,7 +1,7 @@
 """Fit the models to a measurement, and say which is the smallest that suffices."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -9,30 +9,36 @@ import jax.numpy as jnp
 import numpy as np
 
 from ggxref.errors import InputError
-from ggxref.fit import models, objectives, selection, solver
+from ggxref.fit import parameters, selection, solver
 from ggxref.fit.data import Heights, Reflectance
-from ggxref.fit.models import Space
-from ggxref.fit.problem import Problem, from_reflectance, from_surface
-from ggxref.fit.uncertainty import Curvature, Spread, curvature, spread
+from ggxref.fit.models import Surface
+from ggxref.fit.objectives import Objective
+from ggxref.fit.parameters import Model, Space
+from ggxref.fit.problem import FEWEST, Problem, from_reflectance, from_surface
+from ggxref.fit.uncertainty import Spread, curvature, spread
 
 SETTLED = 0.01
 """Standard errors: a minimum is found when the Newton step that is left is shorter."""
 AGREE = 1e-5
 """Starts agree when their losses, of order 1, do."""
+AUTO = "auto"
+TAILS = ("ggx", "student_t")
+"""What "auto" tries: GGX, and the tail free. Beckmann is the limit of the second; asked for, it is tried by itself."""
 
 
 @dataclass(frozen=True)
 class Fit:
     """One model's minimum.
 
-    - `space`: its free directions; `theta`: (p,), see `models`; `covariance` of θ, (p, p).
+    - `tail`: the formula used. `space`: the model's free directions; `theta`: (p,), see `parameters`; `covariance` of θ, (p, p).
     - `values`, `errors`: of the parameters and of what follows from them, by name, in the user's terms.
     - `loss`: the mean that was minimised; `held_out`: the same on each fold, fitted without it.
     - `log_rmse`: of reflectance, over positive samples; NaN for slopes.
     - `agreeing`: how many starts, of how many, found this minimum. `trouble`: why the fit cannot be relied on, or "".
     """
 
-    model: str
+    model: Model
+    tail: str
     space: Space
     theta: np.ndarray
     covariance: np.ndarray
@@ -57,80 +63,138 @@ class Ladder:
 
     @property
     def best(self) -> Fit:
-        return next(fit for fit in self.fits if fit.model == self.chosen)
+        return next(fit for fit in self.fits if fit.model.name == self.chosen)
 
 
 def fit(
     measurement: Reflectance | Heights,
     *,
-    model: str = "auto",
+    model: str = AUTO,
+    tail: str = AUTO,
+    masking: str = "height_correlated",
+    fresnel: str = "schlick",
     fixed: Mapping[str, float] | None = None,
     min_cosine: float = 0.05,
+    samples: int = 4096,
     degree: int = 1,
 ) -> Ladder:
-    """Fit `model`, or with "auto" every model, and choose.
+    """Fit every model of these shapes and tails, and choose the smallest that suffices.
 
+    - `model`: shapes, separated by commas: isotropic, anisotropic, rotated, ellipsoid; "auto" is all.
+    - `tail`: ggx, beckmann, student_t, separated by commas; "auto" is ggx and student_t.
+    - `masking`: height_correlated, separable or v_cavity; `fresnel`: schlick or conductor. Of reflectance.
     - `fixed`: values of parameters to hold, by name (`alpha_x`, `f0`, `diffuse`, …; `alpha` is both).
     - `min_cosine`: reflectance uses samples whose cosines with the normal exceed it.
+    - `samples`: of reflectance, at most; more are thinned evenly.
     - `degree`: of the polynomial that levels a height field.
     """
-    _check(min_cosine, degree, model)
+    _check_range(min_cosine, samples, degree)
+    shapes = _choice("model", model, tuple(parameters.SHAPES), tuple(parameters.SHAPES))
+    tails = _choice("tail", tail, parameters.TAILS, TAILS)
+    _choice("masking", masking, ("height_correlated", "separable", "v_cavity"))
+    _choice("fresnel", fresnel, tuple(parameters.FRESNEL))
     if isinstance(measurement, Reflectance):
-        problem = from_reflectance(measurement, min_cosine=min_cosine)
+        surface = Surface(masking=masking, fresnel=fresnel)
+        problem = from_reflectance(measurement, surface, min_cosine=min_cosine, most=samples)
     else:
         problem = from_surface(measurement, degree=degree)
     held = _fixed(fixed or {}, problem.parameters)
-    fits = fit_models(problem, _wanted(model, problem, held), held)
+    fits = fit_models(problem, _wanted(shapes, model == AUTO, tails, problem, held), held)
     sound = [fit for fit in fits if not fit.trouble] or fits
-    chosen = selection.choose([fit.model for fit in sound], np.stack([fit.held_out for fit in sound]))
+    chosen = selection.choose([fit.model.name for fit in sound], np.stack([fit.held_out for fit in sound]))
     return Ladder(measurement, problem, fits, chosen)
 
 
-def _check(min_cosine: float, degree: int, model: str) -> None:
+def _check_range(min_cosine: float, samples: int, degree: int) -> None:
     if not 0 <= min_cosine < 1:
         raise InputError(f"smallest cosine {min_cosine:g}; need a number from 0 to below 1")
+    if samples < FEWEST:
+        raise InputError(f"at most {samples} samples; need at least {FEWEST}")
     if not 0 <= degree <= 8:
         raise InputError(f"levelling by a polynomial of degree {degree}; need 0 (the mean), 1 (a plane), up to 8")
-    if model != "auto" and model not in models.MODELS:
-        raise InputError(f"model {model!r}; need auto or one of {', '.join(models.MODELS)}")
 
 
-def _wanted(model: str, problem: Problem, held: Mapping[str, float]) -> list[str]:
-    """The models to fit: all that hold what is held, or the one that was asked for."""
-    can = [name for name, groups in problem.models.items() if models.admits(groups, held)]
-    if model == "auto" and can:
-        return can
-    if model in can:
-        return [model]
-    if model in problem.models or model == "auto":
-        what = ", ".join(name for name in held if name in models.SHAPE)
-        raise InputError(f"model {model!r} cannot hold these values of {what}")
-    raise InputError(
-        f"model {model!r}: this data cannot tell it from a smaller one; need {' or '.join(problem.models)}"
-    )
+def _choice(what: str, words: str, known: tuple[str, ...], auto: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """The names in `words`, separated by commas, in the order known; one alone where there is no `auto`."""
+    if auto and words == AUTO:
+        return auto
+    given = words.split(",") if auto else [words]
+    for word in given:
+        if word not in known:
+            raise InputError(f"{what} {word!r}; need {f'{AUTO} or ' if auto else ''}one of {', '.join(known)}")
+    return tuple(name for name in known if name in given)
 
 
-def _fixed(fixed: Mapping[str, float], parameters: tuple[str, ...]) -> dict[str, float]:
+def _wanted(
+    shapes: Sequence[str], auto: bool, tails: Sequence[str], problem: Problem, held: Mapping[str, float]
+) -> list[Model]:
+    """The models of these shapes and tails that can hold what is held; a shape that was asked for must be seen."""
+    unseen = [] if auto else [name for name in shapes if name not in problem.shapes]
+    if unseen:
+        need = " or ".join(problem.shapes)
+        raise InputError(f"model {unseen[0]!r}: this data cannot tell it from a smaller one; need {need}")
+    groups = {name: problem.shapes[name] for name in shapes if name in problem.shapes}
+    can = [model for model in parameters.ladder(groups, tails) if parameters.admits(model.groups, held)]
+    if not can:
+        what = ", ".join(name for name in held if name in parameters.SHAPE)
+        raise InputError(f"model {', '.join(shapes)} with tail {', '.join(tails)} cannot hold these values of {what}")
+    return can
+
+
+def _fixed(fixed: Mapping[str, float], known: tuple[str, ...]) -> dict[str, float]:
     """θ's entries for the user's values; `alpha` is short for both alphas, `f0` for all bands' F0."""
     entries: dict[str, float] = {}
     for name, value in fixed.items():
-        members = [known for known in parameters if known == name or known.startswith((f"{name}_", f"{name} "))]
+        members = [each for each in known if each == name or each.startswith((f"{name}_", f"{name} "))]
         if not members:
-            raise InputError(f"no parameter {name!r} to fix; this data has {', '.join(parameters)}")
-        entries |= {member: models.from_user(member, value) for member in members}
+            raise InputError(f"no parameter {name!r} to fix; this data has {', '.join(known)}")
+        entries |= {member: parameters.from_user(member, value) for member in members}
     return entries
 
 
-def fit_models(problem: Problem, wanted: list[str], fixed: Mapping[str, float]) -> tuple[Fit, ...]:
+def fit_models(problem: Problem, wanted: Sequence[Model], fixed: Mapping[str, float]) -> tuple[Fit, ...]:
     """Every wanted model from every start, then its standard errors and its loss on each fold fitted without it."""
-    spaces = [models.space(problem.models[name], problem.parameters, fixed, problem.scale) for name in wanted]
+    # GGX is the Student-t tail held at γ = 2: where both are wanted, one compiled formula serves them. After the first, a
+    # model starts from half as many places, and from the model before it, which it mostly holds.
+    free_tail = any(model.tail == "student_t" for model in wanted)
+    fits: list[Fit] = []
     with solver.float64():
         samples = tuple(jnp.asarray(array) for array in problem.samples)
-        found = _from_starts(problem, samples, spaces)
-        theta = np.stack([each.theta for each in found])
-        at = [curvature(problem, samples, *each) for each in zip(theta, spaces, strict=True)]
-        held_out = selection.held_out(problem, samples, spaces, theta, at)
-        return tuple(_fit(problem, samples, *parts) for parts in zip(wanted, spaces, found, at, held_out, strict=True))
+        for model in wanted:
+            tail = "student_t" if free_tail and model.tail == "ggx" else model.tail
+            starts = np.stack([*problem.starts[:: 2 if fits else 1], *(fit.theta for fit in fits[-1:])])
+            fits.append(_fit(problem, samples, model, tail, fixed, starts))
+    return tuple(fits)
+
+
+def _fit(
+    problem: Problem, samples: tuple, model: Model, tail: str, fixed: Mapping[str, float], starts: np.ndarray
+) -> Fit:
+    objective = problem.objective(tail)
+    space = parameters.space(model.groups, problem.parameters, fixed, problem.scale)
+    found = _from_starts(problem, objective, samples, space, starts)
+
+    def by_block(theta):
+        return np.bincount(problem.block, problem.weights * solver.losses(objective, theta, samples))
+
+    at = curvature(by_block, found.theta, space)
+    wide = spread(at, space)
+    values, errors = parameters.report(found.theta, wide.covariance, problem.parameters)
+    return Fit(
+        model=model,
+        tail=tail,
+        space=space,
+        theta=found.theta,
+        covariance=wide.covariance,
+        values=values,
+        errors=errors,
+        loss=found.loss,
+        held_out=selection.held_out(problem, objective, samples, space, found.theta, at),
+        bic=selection.bic(problem, found.loss, space.size),
+        log_rmse=_log_rmse(problem, objective, samples, found.theta),
+        agreeing=(found.agreeing, len(starts)),
+        trouble=_trouble(found.met, wide),
+    )
 
 
 class Found(NamedTuple):
@@ -142,51 +206,25 @@ class Found(NamedTuple):
     agreeing: int
 
 
-def _from_starts(problem: Problem, samples: tuple, spaces: list[Space]) -> list[Found]:
-    """Each model's best minimum from all starts."""
-    lanes = [(space.held, space.basis, space.coordinates(start)) for space in spaces for start in problem.starts]
-    held, basis, start = (np.stack(column) for column in zip(*lanes, strict=True))
-    minima = solver.minimise(problem.objective, samples, held, basis, start, [problem.weights] * len(lanes))
-    weights = jnp.asarray(problem.weights)
-    losses = [solver.mean_loss(problem.objective, jnp.asarray(row), samples, weights) for row in minima.theta]
-    # A start that ran off to where the loss is no number has not found a minimum.
-    each = np.nan_to_num(np.array(losses), nan=math.inf).reshape(len(spaces), -1)
-    found = []
-    for k, loss in enumerate(each):
-        best = int(np.argmin(loss))
-        row = k * len(loss) + best
-        agreeing = int(np.sum(loss <= loss[best] + AGREE))
-        found.append(Found(np.asarray(minima.theta[row]), float(loss[best]), bool(minima.found[row]), agreeing))
-    return found
+def _from_starts(problem: Problem, objective: Objective, samples: tuple, space: Space, starts: np.ndarray) -> Found:
+    """The model's best minimum from all starts."""
+    minima = solver.minimise(objective, samples, space, starts, [problem.weights] * len(starts))
+    each = [solver.losses(objective, theta, samples) for theta in minima.theta]
+    loss = np.array([np.average(losses, weights=problem.weights) for losses in each])
+    best = int(np.argmin(loss))
+    agreeing = int(np.sum(loss <= loss[best] + AGREE))
+    return Found(np.asarray(minima.theta[best]), float(loss[best]), bool(minima.found[best]), agreeing)
 
 
-def _fit(problem: Problem, samples, model: str, space: Space, found: Found, at: Curvature, held_out) -> Fit:
-    wide = spread(at, space.basis)
-    values, errors = models.report(found.theta, wide.covariance, problem.parameters)
-    return Fit(
-        model=model,
-        space=space,
-        theta=found.theta,
-        covariance=wide.covariance,
-        values=values,
-        errors=errors,
-        loss=found.loss,
-        held_out=held_out,
-        bic=selection.bic(problem, found.loss, space.size),
-        log_rmse=_log_rmse(problem, samples, found.theta),
-        agreeing=(found.agreeing, len(problem.starts)),
-        trouble=_trouble(found.met, wide),
-    )
-
-
-def _log_rmse(problem: Problem, samples: tuple, theta: np.ndarray) -> float:
+def _log_rmse(problem: Problem, objective: Objective, samples: tuple, theta: np.ndarray) -> float:
     """Root mean square of log(f̂/f) over the positive samples; NaN for slopes."""
-    if problem.objective is not objectives.REFLECTANCE:
+    if not problem.surface:
         return math.nan
-    *directions, measured, _ = samples
-    model, measured = models.brdfs(theta, *directions), np.asarray(measured)
-    positive = measured > 0
-    return float(np.sqrt(np.mean(np.log(model[positive] / measured[positive]) ** 2)))
+    *directions, measured, noise = samples
+    residuals = np.asarray(solver.terms(objective, jnp.asarray(theta), (*directions, measured, jnp.zeros_like(noise))))
+    # The pseudo-Huber loss l = √(1 + r²) − 1 of each band, turned round: r² = l (l + 2).
+    loss = residuals[problem.samples[3] > 0] ** 2 * len(residuals) / 2
+    return float(np.sqrt(np.mean(loss * (loss + 2))))
 
 
 def _trouble(found: bool, wide: Spread) -> str:

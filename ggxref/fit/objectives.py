@@ -6,6 +6,7 @@ of e and linear beyond. **Slopes**: minus the log-likelihood, $-\log P^{22}$.
 """
 
 from collections.abc import Callable
+from functools import cache
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -13,41 +14,48 @@ import numpy as np
 from jax import Array
 
 from ggxref.fit import models
+from ggxref.fit.models import Surface
+
+Sample = tuple[Array, ...]
 
 
 class Objective(NamedTuple):
     """`loss(theta, sample)` of one sample, and where the loss is half a sum of squares, `residual` with those squares."""
 
-    loss: Callable[[Array, tuple[Array, ...]], Array]
-    residual: Callable[[Array, tuple[Array, ...]], Array] | None
+    loss: Callable[[Array, Sample], Array]
+    residual: Callable[[Array, Sample], Array] | None
 
 
-def log_ratio(theta: Array, sample: tuple[Array, ...]) -> Array:
-    """r per band. `sample`: wi (3,), wo (3,), wm (3,), f (bands,), ε ()."""
-    wi, wo, wm, measured, noise = sample
-    model = models.brdf(theta, wi, wo, wm)
-    return jnp.log((model * wo[2] + noise) / (measured * wo[2] + noise))
+@cache
+def reflectance(surface: Surface) -> Objective:
+    """A sample is wi (3,), wo (3,), wm (3,), f (bands,), ε ()."""
+
+    def log_ratio(theta: Array, sample: Sample) -> Array:
+        wi, wo, wm, measured, noise = sample
+        model = models.brdf(theta, wi, wo, wm, surface)
+        return jnp.log((model * wo[2] + noise) / (measured * wo[2] + noise))
+
+    def loss(theta: Array, sample: Sample) -> Array:
+        r = log_ratio(theta, sample)
+        return jnp.mean(r * r / (1 + jnp.sqrt(1 + r * r)))
+
+    def residual(theta: Array, sample: Sample) -> Array:
+        r = log_ratio(theta, sample)
+        # √(2(√(1 + r²) − 1)) with the sign of r; the plain form cancels at r = 0 and has no derivative there.
+        return r * jnp.sqrt(2 / (1 + jnp.sqrt(1 + r * r)) / len(r))
+
+    return Objective(loss, residual)
 
 
-def robust_residual(theta: Array, sample: tuple[Array, ...]) -> Array:
-    """Half the square of this is the mean of the pseudo-Huber losses of the bands."""
-    r = log_ratio(theta, sample)
-    # √(2(√(1 + r²) − 1)) with the sign of r; the plain form cancels at r = 0 and has no derivative there.
-    return r * jnp.sqrt(2 / (1 + jnp.sqrt(1 + r * r)) / len(r))
+@cache
+def slopes(tail: str) -> Objective:
+    """A sample is a slope (2,)."""
 
+    def loss(theta: Array, sample: Sample) -> Array:
+        return -models.log_slope_density(theta, sample[0], tail)
 
-def robust_loss(theta: Array, sample: tuple[Array, ...]) -> Array:
-    r = log_ratio(theta, sample)
-    return jnp.mean(r * r / (1 + jnp.sqrt(1 + r * r)))
+    return Objective(loss, None)
 
-
-def log_loss(theta: Array, sample: tuple[Array, ...]) -> Array:
-    """`sample`: a slope (2,)."""
-    return -jnp.log(models.slope_density(theta, sample[0]))
-
-
-REFLECTANCE = Objective(robust_loss, robust_residual)
-SLOPES = Objective(log_loss, None)
 
 NOISE_QUANTILE = 0.01
 

@@ -1,14 +1,16 @@
 """From a measurement to what the solver takes: samples, weights, starts, and how the samples hang together."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ggxref.errors import InputError
-from ggxref.fit import models, objectives
+from ggxref.fit import objectives, parameters
 from ggxref.fit.data import Heights, Reflectance
+from ggxref.fit.models import Surface
 from ggxref.fit.objectives import Objective
+from ggxref.fit.parameters import Groups
 from ggxref.fit.slopes import TILES, Slopes, from_heights
 
 FOLDS = 8
@@ -24,52 +26,58 @@ IN_PLANE = 1e-6
 class Problem:
     """`samples`: arrays (..., n), the objective's. `block`, `fold`: (n,) integers from 0.
 
-    - `starts`: θ, (starts, p). `scale`: the typical slope. `models`: those that this data can tell apart.
+    - `surface`: the reflectance model's fixed parts; None for slopes. `shapes`: those that this data can tell apart.
+    - `parameters`: θ's names. `starts`: θ, (starts, p). `scale`: the typical slope.
     """
 
-    objective: Objective
     samples: tuple[np.ndarray, ...]
     weights: np.ndarray
     block: np.ndarray
     fold: np.ndarray
+    surface: Surface | None
+    shapes: dict[str, Groups]
     parameters: tuple[str, ...]
     starts: np.ndarray
     scale: float
-    models: models.Models
     notes: tuple[str, ...]
 
     @property
     def size(self) -> int:
         return len(self.weights)
 
+    def objective(self, tail: str) -> Objective:
+        """What to minimise, with the formula of this tail."""
+        return objectives.reflectance(replace(self.surface, tail=tail)) if self.surface else objectives.slopes(tail)
 
-def from_reflectance(data: Reflectance, *, min_cosine: float = 0.05) -> Problem:
-    """The BRDF's problem, over the samples whose two cosines with the normal exceed `min_cosine`."""
-    used = data.mask & (data.wi[:, 2] > min_cosine) & (data.wo[:, 2] > min_cosine)
-    if used.sum() < FEWEST:
+
+def from_reflectance(data: Reflectance, surface: Surface, *, min_cosine: float, most: int) -> Problem:
+    """The BRDF's problem, over the samples whose two cosines with the normal exceed `min_cosine`, thinned to `most`."""
+    used = np.flatnonzero(data.mask & (data.wi[:, 2] > min_cosine) & (data.wo[:, 2] > min_cosine))
+    if len(used) < FEWEST:
         raise InputError(
-            f"{data.source.path}: {used.sum()} of {len(used)} samples have cosines above {min_cosine:g}; "
-            f"need at least {FEWEST}"
+            f"{data.source.path}: {len(used)} of {len(data.mask)} samples have cosines above {min_cosine:g}; need at least {FEWEST}"
         )
-    wi, wo, values, weights = data.wi[used], data.wo[used], data.values[used], data.weights[used]
+    kept = used if len(used) <= most else used[np.arange(most) * len(used) // most]
+    wi, wo, values, weights = data.wi[kept], data.wo[kept], data.values[kept], data.weights[kept]
     noise = objectives.noise_floor(values, wo)
-    notes = [f"{used.sum()} of {len(used)} samples used (cosines above {min_cosine:g})"]
-    notes += [f"{count} left out: {why}" for why, count in data.excluded.items() if count]
+    notes = [f"{len(used)} of {len(data.mask)} samples used (cosines above {min_cosine:g})"]
+    notes += [f"{len(kept)} of them fitted, evenly through the file"] if len(kept) < len(used) else []
+    notes += [f"{count} samples {what}" for what, count in data.counts.items() if count]
     notes.append(f"noise floor of f·cosθo: {noise:.3g} 1/sr")
-    wi, wo, family, plane = _plane(wi, wo)
+    wi, wo, shapes, plane = _plane(wi, wo)
     notes += plane
-    direction = np.unique(np.round(wi, 6), axis=0, return_inverse=True)[1].reshape(-1)
+    direction = _directions(wi)
     runs = _runs(direction)
     return Problem(
-        objective=objectives.REFLECTANCE,
         samples=(wi.T, wo.T, _half(wi, wo).T, np.maximum(values, 0).T, np.full(len(wi), noise)),
         weights=weights,
         block=direction * BLOCKS + runs,
         fold=direction % FOLDS if direction.max() else runs,
-        parameters=models.names(data.bands),
-        starts=_reflectance_starts(values),
+        surface=surface,
+        shapes=shapes,
+        parameters=parameters.names(data.bands, surface.fresnel),
+        starts=_reflectance_starts(values, surface.fresnel),
         scale=0.1,
-        models=family,
         notes=tuple(notes),
     )
 
@@ -88,15 +96,15 @@ def from_slopes(surface: Slopes, notes: tuple[str, ...] = ()) -> Problem:
     # Folds take every eighth tile, shifted from row to row, so that each holds all columns and all rows.
     row, column = np.divmod(surface.tile, TILES)
     return Problem(
-        objective=objectives.SLOPES,
         samples=(np.ascontiguousarray(surface.slopes.T),),
         weights=np.ones(len(surface.slopes)),
         block=surface.tile,
         fold=(row * 3 + column) % FOLDS,
-        parameters=models.names(()),
+        surface=None,
+        shapes=parameters.SHAPES,
+        parameters=parameters.names(()),
         starts=starts,
         scale=scale,
-        models=models.MODELS,
         notes=notes,
     )
 
@@ -105,6 +113,14 @@ def _half(wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
     """Half vectors, (n, 3); both directions are above the horizon, so that none is zero."""
     both = wi + wo
     return both / np.linalg.norm(both, axis=1, keepdims=True)
+
+
+def _directions(wi: np.ndarray) -> np.ndarray:
+    """For each sample, which incident direction it has; where nearly every sample has its own, which eighth of the zeniths."""
+    _, direction = np.unique(np.round(wi, 6), axis=0, return_inverse=True)
+    if direction.max() < len(wi) / BLOCKS:
+        return direction.reshape(-1)
+    return np.searchsorted(np.quantile(wi[:, 2], np.arange(1, FOLDS) / FOLDS), wi[:, 2])
 
 
 def _runs(direction: np.ndarray) -> np.ndarray:
@@ -116,38 +132,43 @@ def _runs(direction: np.ndarray) -> np.ndarray:
     return runs
 
 
-def _plane(wi, wo) -> tuple[np.ndarray, np.ndarray, models.Models, list[str]]:
-    """Where all directions lie in one vertical plane: turned into the xz plane, with the models that can be told apart there.
+def _plane(wi, wo) -> tuple[np.ndarray, np.ndarray, dict[str, Groups], list[str]]:
+    """Where all directions lie in one vertical plane: turned into the xz plane, with the shapes that can be told apart there.
 
     There αy enters through the peak's height alone, as F0 does, and the mean slope across the plane not to first order.
     """
     horizontal = np.concatenate([wi[:, :2], wo[:, :2]])
     _, spread, axes = np.linalg.svd(horizontal, full_matrices=False)
     if spread[1] > IN_PLANE * spread[0]:
-        return wi, wo, models.MODELS, []
+        return wi, wo, parameters.SHAPES, []
     cosine, sine = axes[0] * (1 if axes[0][0] >= 0 else -1)
     turn = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
     azimuth = math.degrees(math.atan2(sine, cosine))
     notes = ["all directions lie in one plane, which cannot see αy apart from αx, nor a shear or a mean slope across"]
     notes += [f"x is along that plane, at azimuth {azimuth:.4g}°"] if abs(azimuth) > 1e-3 else []
-    return wi @ turn.T, wo @ turn.T, models.IN_PLANE, notes
+    return wi @ turn.T, wo @ turn.T, parameters.IN_PLANE, notes
 
 
-def _reflectance_starts(values: np.ndarray) -> np.ndarray:
-    """Roughnesses over two decades, stretched to either side, with the diffuse term at the level of the darkest tenth."""
-    bands = values.shape[1]
-    alpha = np.log([0.005, 0.02, 0.05, 0.1, 0.2, 0.5])
+def _reflectance_starts(values: np.ndarray, fresnel: str) -> np.ndarray:
+    """Roughnesses over two decades, stretched to either side, with the diffuse term at the level of the darkest tenth.
+
+    F0 starts at 1/2, a conductor at that of η = 1 and k = 2.
+    """
+    alpha = np.log(np.geomspace(0.005, 0.6, 6))
     stretch = np.array([0.3, -0.3] * 3)
     dark = np.log(np.clip(math.pi * np.quantile(values, 0.1, axis=0), 1e-4, 0.9))
-    starts = np.zeros((len(alpha), len(models.SHAPE) + 2 * bands))
-    starts[:, 0], starts[:, 1] = alpha + stretch, alpha - stretch
-    starts[:, -bands:] = dark
+    interface = {"schlick": [0.0], "conductor": [0.0, math.log(2)]}[fresnel]
+    rest = np.concatenate([np.repeat(interface, values.shape[1]), dark])
+    starts = np.zeros((len(alpha), len(parameters.SHAPE) + len(rest)))
+    starts[:, 0], starts[:, 1], starts[:, 5] = alpha + stretch, alpha - stretch, parameters.GGX
+    starts[:, len(parameters.SHAPE) :] = rest
     return starts
 
 
 def _slope_starts(slopes: np.ndarray) -> tuple[np.ndarray, float]:
     """The median slope, which for GGX is α, and three times it: the likelihood has one peak, so that both must agree."""
     scale = float(np.median(np.hypot(*slopes.T)))
-    starts = np.zeros((2, len(models.SHAPE)))
+    starts = np.zeros((2, len(parameters.SHAPE)))
     starts[:, :2] = np.log([[scale], [3 * scale]])
+    starts[:, 5] = parameters.GGX
     return starts, scale

@@ -8,7 +8,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from ggxref.fit import models
+from ggxref.fit import models, parameters
 from ggxref.fit.data import Heights
 from ggxref.fit.fitting import Fit, Ladder
 
@@ -22,9 +22,13 @@ def tables(ladder: Ladder) -> RenderableType:
     parts += [Text(f"  {note}") for note in ladder.problem.notes]
     parts += ["", _ladder(ladder), ""]
     if len(ladder.fits) > 1:
-        parts += [Text(f"Smallest model that suffices: {best.model}", style="bold"), ""]
+        parts += [Text(f"Smallest model that suffices: {best.model.name}", style="bold"), ""]
     parts.append(_parameters(best))
-    parts += [Text(f"{fit.model}: {fit.trouble}", style="bold") for fit in ladder.fits if fit.trouble]
+    parts += [Text(f"{fit.model.name}: {fit.trouble}", style="bold") for fit in ladder.fits if fit.trouble]
+    if best.agreeing[0] == 1:
+        parts.append(
+            Text(f"Only one of {best.agreeing[1]} starts ended here: there may be a better minimum", style="bold")
+        )
     return Group(*parts)
 
 
@@ -39,19 +43,18 @@ def _ladder(ladder: Ladder) -> Table:
     heights = isinstance(ladder.measurement, Heights)
     table = _table("Models, smallest first; the loss is per sample, on folds that the fit did not see", "model")
     quality = "log-likelihood" if heights else "log-RMSE"
-    for column in ("free", quality, "loss", "above the best", "ΔBIC", "starts"):
+    for column in ("free", quality, "loss", "above the best", "ΔBIC"):
         table.add_column(column, justify="right", no_wrap=True)
     least = min(fit.bic for fit in ladder.fits)
     for fit in ladder.fits:
         above, error = excess(ladder, fit)
         table.add_row(
-            fit.model,
+            fit.model.name,
             str(fit.space.size),
             f"{-fit.loss if heights else fit.log_rmse:.4f}",
             f"{fit.held_out.mean():.4f}",
             f"{above:.2g} ± {error:.1g}" if above else "",
             f"{fit.bic - least:.1f}",
-            f"{fit.agreeing[0]} of {fit.agreeing[1]}",
         )
     return table
 
@@ -64,7 +67,7 @@ def _table(title: str, names: str) -> Table:
 
 
 def _parameters(fit: Fit) -> Table:
-    table = _table(f"Parameters, {fit.model}", "parameter")
+    table = _table(f"Parameters, {fit.model.name}", "parameter")
     table.add_column("value", justify="right", no_wrap=True)
     table.add_column("std. error", justify="right", no_wrap=True)
     table.add_column("meaning")
@@ -82,6 +85,9 @@ MEANING = {
     "shear": "C[1][0]",
     "mean_x": "mean slope along x",
     "mean_y": "mean slope along y",
+    "gamma": "tail: 2 is GGX, larger is shorter, infinite Beckmann",
+    "eta": "refractive index, real part",
+    "k": "refractive index, imaginary part",
     "f0": "reflectance at normal incidence",
     "diffuse": "albedo of the diffuse term",
     "alpha_1": "roughness along the rougher axis",
@@ -95,10 +101,10 @@ MEANING = {
 def rows(fit: Fit) -> list[tuple[str, float, float, bool]]:
     """Name, value, standard error and whether it was free: of what the model moves or the user held, and what follows."""
     free = {name: bool(moved) for name, moved in zip(fit.values, fit.space.moved, strict=False)}
-    names = [name for name in free if free[name] or fit.values[name]]
+    names = [name for name in free if free[name] or (name != "gamma" and fit.values[name])]
     circular = not free["shear"] and np.array_equal(fit.space.basis[0], fit.space.basis[1])
     if not circular:
-        names += [name for name in models.DERIVED if name.startswith("a") or free["shear"]]
+        names += [name for name in parameters.DERIVED if name.startswith("a") or free["shear"]]
     if free["mean_x"] and free["mean_y"] and "mean_slope" not in names:
         names.append("mean_slope")
     if circular:
@@ -131,7 +137,7 @@ def document(ladder: Ladder, options: dict) -> dict:
 def _model(ladder: Ladder, fit: Fit) -> dict:
     above, error = excess(ladder, fit)
     return {
-        "model": fit.model,
+        "model": fit.model.name,
         "converged": not fit.trouble,
         "trouble": fit.trouble,
         "starts": {"agreeing": fit.agreeing[0], "of": fit.agreeing[1]},

@@ -11,12 +11,12 @@ import optimistix as optx
 from jax import Array
 
 from ggxref.fit.objectives import Objective
+from ggxref.fit.parameters import Space
 
 MOST_STEPS = 256
 TOLERANCE = 1e-6
-"""Of a quasi-Newton step in y, whose entries are of order 1. Below it, differences of the loss drown in rounding."""
-LEAST_SQUARES_TOLERANCE = 1e-9
-"""Levenberg–Marquardt steps come from a QR of the Jacobian, not from differences of the loss."""
+"""Of a step in y, whose entries are of order 1; below it, the differences of a loss drown in rounding. What is left to the
+minimum is checked against the standard errors."""
 
 
 def float64():
@@ -33,17 +33,20 @@ class Minimum(NamedTuple):
     steps: Array | np.ndarray
 
 
-def losses(objective: Objective, theta: Array, samples: tuple[Array, ...]) -> Array:
-    """The loss of each sample, (n,). The samples' arrays are components first, (..., n)."""
-    return jax.vmap(objective.loss, (None, -1))(theta, samples)
+@partial(jax.jit, static_argnames=("objective",))
+def terms(objective: Objective, theta: Array, samples: tuple[Array, ...]) -> Array:
+    """(bands, n): the residuals, half of whose squares sum to the losses; without residuals the losses themselves, (n,).
+
+    The samples' arrays are components first, (..., n).
+    """
+    return jax.vmap(objective.residual or objective.loss, (None, -1), -1)(theta, samples)
 
 
-def _mean(objective, theta, samples, weights):
-    return jnp.sum(weights * losses(objective, theta, samples)) / jnp.sum(weights)
-
-
-mean_loss = jax.jit(_mean, static_argnames=("objective",))
-"""`mean_loss(objective, theta, samples, weights)`: the weighted mean of the losses."""
+def losses(objective: Objective, theta: np.ndarray, samples: tuple[Array, ...]) -> np.ndarray:
+    """The loss of each sample, (n,); infinite where it is no number."""
+    found = np.asarray(terms(objective, jnp.asarray(theta), samples))
+    loss = found if objective.residual is None else (found * found).sum(axis=0) / 2
+    return np.where(np.isnan(loss), np.inf, loss)
 
 
 def _with_jacobian(residuals):
@@ -65,28 +68,18 @@ def _with_jacobian(residuals):
     return wrapped
 
 
-def _solve(objective, samples, held, basis, start, weights):
-    def theta(y):
-        # Row by row and not `basis @ y`, so that a held -inf (no diffuse term) meets no product.
-        return held + jnp.sum(basis * y, axis=1)
-
-    solution = (_likelihood if objective.residual is None else _least_squares)(
-        objective, theta, samples, start, weights
-    )
-    return Minimum(theta(solution.value), solution.result == optx.RESULTS.successful, solution.stats["num_steps"])
-
-
 def _likelihood(objective, theta, samples, start, weights):
     solver = optx.BFGS(rtol=TOLERANCE, atol=TOLERANCE)
 
     def mean(y, _):
-        return _mean(objective, theta(y), samples, weights)
+        each = jax.vmap(objective.loss, (None, -1))(theta(y), samples)
+        return jnp.sum(weights * each) / jnp.sum(weights)
 
     return optx.minimise(mean, solver, start, max_steps=MOST_STEPS, throw=False)
 
 
 def _least_squares(objective, theta, samples, start, weights):
-    solver = optx.LevenbergMarquardt(rtol=LEAST_SQUARES_TOLERANCE, atol=LEAST_SQUARES_TOLERANCE)
+    solver = optx.LevenbergMarquardt(rtol=TOLERANCE, atol=TOLERANCE)
     roots = jnp.sqrt(weights / jnp.sum(weights))
 
     @_with_jacobian
@@ -96,34 +89,28 @@ def _least_squares(objective, theta, samples, start, weights):
     return optx.least_squares(lambda y, _: residuals(y), solver, start, max_steps=MOST_STEPS, throw=False)
 
 
-LANES = 8
-"""Lanes a call. A fixed number, so that one compilation serves starts, folds and any number of models."""
-
-
 @partial(jax.jit, static_argnames=("objective",))
-def _minimise(objective, samples, held, basis, start, weights):
-    # One lane after the other: lanes side by side would wait for the slowest, and compile three times as long.
-    return jax.lax.map(lambda lane: _solve(objective, samples, *lane), (held, basis, start, weights))
+def _solve(objective, samples, held, basis, start, weights):
+    def theta(y):
+        # Row by row and not `basis @ y`, so that a held -inf (no diffuse term) meets no product.
+        return held + jnp.sum(basis * y, axis=1)
+
+    method = _likelihood if objective.residual is None else _least_squares
+    solution = method(objective, theta, samples, start, weights)
+    return Minimum(theta(solution.value), solution.result == optx.RESULTS.successful, solution.stats["num_steps"])
 
 
 def minimise(
-    objective: Objective,
-    samples: tuple[Array, ...],
-    held: np.ndarray,
-    basis: np.ndarray,
-    start: np.ndarray,
-    weights: Sequence[np.ndarray],
+    objective: Objective, samples: tuple[Array, ...], space: Space, starts: np.ndarray, weights: Sequence[np.ndarray]
 ) -> Minimum:
-    """The minimum of each lane, as NumPy arrays (lanes, ...).
+    """The minimum in `space` from each start, as NumPy arrays with a leading axis.
 
-    - `samples`: arrays (..., n), shared by all lanes. `held`: (lanes, p); `basis`: (lanes, p, p); `start`: y, (lanes, p).
-    - `weights`: (n,) for each lane.
+    - `samples`: arrays (..., n). `starts`: θ, (starts, p). `weights`: (n,) for each start.
     """
-    chunks = []
-    for first in range(0, len(held), LANES):
-        # The last chunk is filled up with its last lane.
-        rows = np.minimum(np.arange(first, first + LANES), len(held) - 1)
-        lanes = (jnp.asarray(array[rows]) for array in (held, basis, start))
-        minima = _minimise(objective, samples, *lanes, jnp.asarray(np.stack([weights[row] for row in rows])))
-        chunks.append(jax.tree.map(np.asarray, minima))
-    return jax.tree.map(lambda *parts: np.concatenate(parts)[: len(held)], *chunks)
+    held, basis = jnp.asarray(space.held), jnp.asarray(space.basis)
+    # One after the other: under one `vmap` all would wait for the slowest, and compile three times as long.
+    minima = [
+        _solve(objective, samples, held, basis, jnp.asarray(space.coordinates(start)), jnp.asarray(each))
+        for start, each in zip(starts, weights, strict=True)
+    ]
+    return jax.tree.map(lambda *parts: np.stack(parts), *minima)

@@ -4,59 +4,42 @@ H is the Hessian of the summed loss, M the sum over blocks of the outer product 
 residuals along one lobe, share their errors: over single samples the same formula would be some ten times too sure.
 """
 
-from functools import partial
+from collections.abc import Callable
 from typing import NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
-from ggxref.fit.models import Space
-from ggxref.fit.problem import Problem
-from ggxref.fit.solver import losses
+from ggxref.fit.parameters import Space
 
 SINGULAR = 1e-7
 """Smallest eigenvalue of H, over the largest, of a minimum that is a point and not a valley (H scaled to ones)."""
+STEP = 1e-3
+"""In y, whose entries are of order 1. Second differences of a loss then keep some seven digits; a standard error shows three."""
 
 
 class Curvature(NamedTuple):
-    """In y, of the sum of the weighted losses: `hessian` (p, p), and `scores`, each block's gradient (blocks, p)."""
+    """In the free y, of the summed losses: `hessian` (k, k), and `scores`, each block's gradient (blocks, k)."""
 
     hessian: np.ndarray
     scores: np.ndarray
 
 
-STEP = 1e-4
-"""In y, whose entries are of order 1: differences of gradients keep some eight digits, and a standard error shows three."""
+def curvature(by_block: Callable[[np.ndarray], np.ndarray], theta: np.ndarray, space: Space) -> Curvature:
+    """The curvature at θ, by central differences: compiled derivatives would take longer than all the fits.
 
-
-@partial(jax.jit, static_argnames=("objective", "blocks"))
-def _scores(objective, samples, weights, block, theta, basis, *, blocks):
-    def by_block(y):
-        each = weights * losses(objective, theta + jnp.sum(basis * y, axis=1), samples)
-        return jax.ops.segment_sum(each, block, blocks)
-
-    return jax.jacfwd(by_block)(jnp.zeros_like(theta))
-
-
-def curvature(problem: Problem, samples: tuple[Array, ...], theta: np.ndarray, space: Space) -> Curvature:
-    """The curvature at θ. Second derivatives are differences of first ones: compiling theirs would take longest of all."""
-    weights, block = jnp.asarray(problem.weights), jnp.asarray(problem.block)
-    blocks = int(problem.block.max()) + 1
-
-    def scores(theta):
-        return np.asarray(
-            _scores(
-                problem.objective, samples, weights, block, jnp.asarray(theta), jnp.asarray(space.basis), blocks=blocks
-            )
-        )
-
-    hessian = np.zeros_like(space.basis)
-    for column in space.columns:
-        step = STEP * space.basis[:, column]
-        hessian[column] = (scores(theta + step).sum(axis=0) - scores(theta - step).sum(axis=0)) / (2 * STEP)
-    return Curvature((hessian + hessian.T) / 2, scores(theta))
+    - `by_block(theta)`: (blocks,), the blocks' sums of the weighted losses.
+    """
+    if not space.size:
+        return Curvature(np.zeros((0, 0)), np.zeros((len(by_block(theta)), 0)))
+    steps = STEP * space.basis[:, space.columns].T
+    middle = by_block(theta).sum()
+    ahead, behind = (np.array([by_block(theta + sign * step) for step in steps]) for sign in (1, -1))
+    hessian = np.diag(ahead.sum(axis=1) + behind.sum(axis=1) - 2 * middle) / STEP**2
+    for i in range(len(steps)):
+        for j in range(i):
+            corners = [by_block(theta + a * steps[i] + b * steps[j]).sum() * a * b for a in (1, -1) for b in (1, -1)]
+            hessian[i, j] = hessian[j, i] = sum(corners) / (4 * STEP**2)
+    return Curvature(hessian, (ahead - behind).T / (2 * STEP))
 
 
 class Spread(NamedTuple):
@@ -67,25 +50,20 @@ class Spread(NamedTuple):
     point: bool
 
 
-def spread(at: Curvature, basis: np.ndarray) -> Spread:
-    """The sandwich of one model, from `Curvature` in its basis; rows and columns of held parameters are 0."""
-    free = basis.any(axis=0)
-    hessian = at.hessian[np.ix_(free, free)]
-    scores = at.scores[:, free]
-    gradient = scores.sum(axis=0)
-    if not free.any():
-        return Spread(np.zeros_like(basis), 0.0, True)
-    unit = np.sqrt(np.abs(np.diag(hessian)))
-    unit = np.where(unit > 0, unit, 1.0)
-    eigenvalues = np.linalg.eigvalsh(hessian / np.outer(unit, unit))
-    inverse = np.linalg.pinv(hessian / np.outer(unit, unit), rcond=SINGULAR, hermitian=True) / np.outer(unit, unit)
-    groups = len(np.unique(np.flatnonzero(scores.any(axis=1))))
+def spread(at: Curvature, space: Space) -> Spread:
+    """The sandwich of one model; rows and columns of held parameters are 0."""
+    if not space.size:
+        return Spread(np.zeros_like(space.basis), 0.0, True)
+    unit = np.sqrt(np.abs(np.diag(at.hessian)))
+    units = np.outer(*[np.where(unit > 0, unit, 1.0)] * 2)
+    eigenvalues = np.linalg.eigvalsh(at.hessian / units)
+    inverse = np.linalg.pinv(at.hessian / units, rcond=SINGULAR, hermitian=True) / units
+    groups = np.count_nonzero(at.scores.any(axis=1))
     # The gradient at the minimum is 0, so that one block's score is minus the others': hence groups - 1.
-    meat = scores.T @ scores * groups / max(groups - 1, 1)
-    y_covariance = inverse @ meat @ inverse
-    errors = np.sqrt(np.diag(y_covariance))
-    step = np.abs(inverse @ gradient) / np.where(errors > 0, errors, 1.0)
-    columns = basis[:, free]
-    return Spread(
-        columns @ y_covariance @ columns.T, float(step.max()), bool(eigenvalues[0] > SINGULAR * eigenvalues[-1])
-    )
+    meat = at.scores.T @ at.scores * groups / max(groups - 1, 1)
+    covariance = inverse @ meat @ inverse
+    errors = np.sqrt(np.diag(covariance))
+    step = np.abs(inverse @ at.scores.sum(axis=0)) / np.where(errors > 0, errors, 1.0)
+    columns = space.basis[:, space.columns]
+    point = bool(eigenvalues[0] > SINGULAR * eigenvalues[-1])
+    return Spread(columns @ covariance @ columns.T, float(step.max()), point)
