@@ -59,10 +59,16 @@ def widened(function: Callable) -> Callable:
 
 @jax.custom_jvp
 def _dot(a, b):
-    (total, rest), *products = (_two_product(x, y) for x, y in zip(a, b, strict=True))
+    (total, error), *products = (_two_product(x, y) for x, y in zip(a, b, strict=True))
+    errors = [error]
     for product, error in products:
         total, lost = _two_sum(total, product)
-        rest = rest + (error + lost)
+        errors += [error, lost]
+    # The products cancel down to their own errors where a is nearly perpendicular to b: these are summed the same way.
+    rest = 0
+    for error in errors:
+        total, lost = _two_sum(total, error)
+        rest = rest + lost
     return total + rest
 
 
@@ -77,12 +83,12 @@ def _dot_jvp(primals, tangents):
 
 @widened
 def dot(a: Components, b: Components) -> Array:
-    r"""$a \cdot b$ in twice the working precision, rounded once: from two (3,), or from two tuples of equally many
+    r"""$a \cdot b$ in three times the working precision, rounded once: from two (3,), or from two tuples of equally many
     components, whose shapes broadcast.
 
     The plain sum has an unbounded relative error where the vectors are nearly perpendicular, and there stand the
     factor $\omega_i \cdot \omega_m$ of every visible density and the decision which side of a microfacet is seen.
-    Ogita, Rump & Oishi 2005, algorithm 5.3.
+    Ogita, Rump & Oishi 2005, algorithm 5.10 with K = 3.
     """
     return _dot(a, b)
 

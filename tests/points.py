@@ -300,7 +300,7 @@ def quantities(rng: Generator, n: int) -> Points:
 _UNIFORM = frozenset({"u", "u3", "rows"})
 
 
-def points(function: str, n: int, seed: int, dtype=np.float64) -> Points:
+def points(function: str, n: int, seed: int, dtype: type = np.float64) -> Points:
     """Inputs of the public function of that dotted name, by argument, `n` rows each, rounded to `dtype`."""
     arguments = FUNCTIONS[function]
     drawn = quantities(np.random.default_rng([seed, *function.encode()]), n)

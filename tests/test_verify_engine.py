@@ -73,7 +73,22 @@ def test_registered_checks_are_told_apart_and_use_the_methods():
     assert len(set(names)) == len(names)
     assert {c.method for c in checks} <= set(engine.METHODS)
     assert {c.paper for c in checks} == set(engine.PAPERS)
-    assert all(c.tolerance <= 1e-3 or c.method == "monte_carlo" or c.tolerance in (0.01, 0.5, 1) for c in checks)
+
+
+# Statements that are about size, not equality: a factor of ten or a hundred, a power of two, two printed digits.
+ROUGH = {
+    ("heitz2014", "limitation"),
+    ("heitz2014", "table 2"),
+    ("heitz2014", "§2.2 Walter's trick"),
+    ("walter2014", "§4.2"),
+    ("dupuy2023", "abstract"),
+    ("dupuy2023", "table 1"),
+}
+
+
+def test_only_statements_about_size_have_a_wide_tolerance():
+    wide = {(c.paper, c.equation) for c in engine.registered() if c.tolerance > 1e-3 and c.method != "monte_carlo"}
+    assert wide == ROUGH
 
 
 def test_selection_by_paper_and_equation():

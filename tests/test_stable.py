@@ -1,0 +1,235 @@
+"""Each primitive against exact arithmetic, and the plain form that it replaces failing the same test."""
+
+from fractions import Fraction
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from flint import arb
+from library import numbers, over_rows
+
+from ggxref import stable
+from ggxref.oracle.precision import working
+
+N = 400
+
+
+def rng():
+    return np.random.default_rng(11)
+
+
+def epsilon(dtype) -> float:
+    return float(jnp.finfo(dtype).eps)
+
+
+def exact(f, *columns) -> np.ndarray:
+    """`f` of each row of exact balls, to float64 and beyond: the high part and what it leaves out."""
+    with working(200):
+        return np.array([f(*(arb(float(x)) for x in row)) for row in zip(*columns, strict=True)], object)
+
+
+def ulps(got, true, dtype) -> float:
+    """Largest error in spacings of the dtype at the true value."""
+    with working(200):
+        errors = [
+            float(abs(arb(float(g)) - t).mid()) / float(np.spacing(np.abs(np.asarray(float(t.mid()), dtype))))
+            for g, t in zip(np.ravel(got), np.ravel(true), strict=True)
+        ]
+    return max(errors)
+
+
+def perpendicular(dtype):
+    """Unit vectors whose dot product is a rounding error or a little more."""
+    r = rng()
+    a = r.normal(size=(N, 3))
+    b = np.cross(a, r.normal(size=(N, 3)))
+    a, b = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (a, b))
+    return a.astype(dtype), (b + a * np.exp(r.uniform(-40, -5, (N, 1)))).astype(dtype)
+
+
+def rational(v):
+    return [Fraction(float(x)) for x in v]
+
+
+def dots(a, b) -> np.ndarray:
+    sums = [sum(x * y for x, y in zip(rational(p), rational(q), strict=True)) for p, q in zip(a, b, strict=True)]
+    return np.array([float(s) for s in sums])
+
+
+def threefold(got, true, dtype) -> bool:
+    """The bound of a sum of a few products of unit vectors in three times the precision, rounded once (Ogita et al. 2005)."""
+    eps = epsilon(dtype)
+    return bool(np.all(np.abs(np.asarray(got, np.float64) - true) <= eps * np.abs(true) + 16 * eps**3))
+
+
+def relative(got, true):
+    return np.max(np.abs(np.asarray(got, np.float64) - true) / np.abs(true))
+
+
+def test_dot_of_nearly_perpendicular_vectors(dtype):
+    """One rounding of a sum in three times the precision; the plain sum keeps no digit."""
+    a, b = perpendicular(dtype)
+    true = dots(a, b)
+    assert threefold(jax.jit(jax.vmap(stable.dot))(a, b), true, dtype)
+    assert not threefold(jax.jit(jax.vmap(jnp.dot))(a, b), true, dtype)
+
+
+def test_dot_of_half_precision_is_rounded_once():
+    a, b = perpendicular(jnp.float16)
+    true = dots(a, b)
+    np.testing.assert_allclose(jax.vmap(stable.dot)(a, b).astype(float), true, rtol=2**-11, atol=2**-24)
+
+
+def test_dot_has_the_plain_derivative(dtype):
+    a, b, da, db = jnp.asarray(rng().normal(size=(4, 3)), dtype)
+    _, change = jax.jvp(stable.dot, (a, b), (da, db))
+    np.testing.assert_allclose(change, da @ b + a @ db, rtol=8 * epsilon(dtype))
+
+
+def test_cross_of_nearly_parallel_vectors(dtype):
+    """Their plain cross product has lost as many digits as they share."""
+    a, b = perpendicular(dtype)
+    b = (a + 1e-4 * b).astype(dtype)
+
+    def true(p, q):
+        (x, y, z), (u, v, w) = rational(p), rational(q)
+        return [float(y * w - z * v), float(z * u - x * w), float(x * v - y * u)]
+
+    expected = np.array([true(p, q) for p, q in zip(a, b, strict=True)])
+    eps = epsilon(dtype)
+    assert relative(jax.jit(jax.vmap(stable.cross))(a, b), expected) <= 2 * eps
+    assert relative(jax.jit(jax.vmap(jnp.cross))(a, b), expected) > 100 * eps
+
+
+def test_excess_of_length(dtype):
+    """(w·w − 1)/2 of rounded unit vectors: the plain form rounds w·w to a few multiples of eps."""
+    w = perpendicular(dtype)[0]
+    true = np.array([float(sum(x * x for x in rational(v)) - 1) / 2 for v in w])
+    assert threefold(jax.jit(jax.vmap(stable.excess))(w), true, dtype)
+    assert not threefold(jax.jit(jax.vmap(lambda w: (w @ w - 1) / 2))(w), true, dtype)
+
+
+def test_log1p(dtype):
+    x = rng().uniform(-0.999, 1, 4 * N).astype(dtype)
+    assert ulps(jax.jit(jax.vmap(stable.log1p))(x), exact(lambda x: x.log1p(), x), dtype) < 3
+
+
+def test_square_root_has_no_infinite_derivative(dtype):
+    slope = jax.vmap(jax.grad(stable.sqrt))(jnp.asarray([0, 4], dtype))
+    np.testing.assert_array_equal(slope, [0, 0.25])
+    assert not np.isfinite(jax.grad(jnp.sqrt)(jnp.asarray(0, dtype)))
+
+
+@pytest.mark.parametrize("form", [stable.unit, stable.direction], ids=["unit", "direction"])
+def test_unit(form, dtype):
+    v = rng().normal(size=(N, 3)).astype(dtype)
+    w = numbers(jax.vmap(form)(*v.T)).reshape(N, 3)
+    np.testing.assert_allclose(np.linalg.norm(w, axis=1), 1, atol=3 * epsilon(dtype))
+    np.testing.assert_allclose(np.cross(w, v), 0, atol=4 * epsilon(dtype) * np.max(np.abs(v)))
+
+
+@pytest.mark.parametrize("form", [stable.unit, stable.direction], ids=["unit", "direction"])
+def test_unit_of_the_zero_vector_is_zero_with_a_zero_gradient(form, dtype):
+    zero = jnp.zeros((), dtype)
+    value, slope = jax.value_and_grad(lambda x: jnp.sum(jnp.stack(tuple(form(x, zero, zero)))))(zero)
+    assert value == 0
+    assert np.isfinite(slope)
+
+
+def test_half_precision_is_normalised_in_float32():
+    """1e-4 squared is 0 in float16."""
+    x = jnp.asarray(1e-4, jnp.float16)
+    assert x * x == 0
+    w = stable.direction(x, 0 * x, x)
+    assert w.dtype == jnp.float16
+    np.testing.assert_allclose(w.astype(float), [np.sqrt(0.5), 0, np.sqrt(0.5)], rtol=2**-10)
+
+
+def test_azimuth(dtype):
+    x, y = rng().normal(size=(2, N)).astype(dtype)
+    c, s = jax.vmap(stable.azimuth)(x, y)
+    np.testing.assert_allclose(np.arctan2(s, c), np.arctan2(y, x), atol=4 * epsilon(dtype))
+    zero = jnp.zeros((), dtype)
+    assert stable.azimuth(zero, zero, pole=(0.0, -1.0)) == (0, -1)
+
+
+def test_cos_sin_turn(dtype):
+    """Near half a turn the sine of a rounded 2πu has only the digits that π u keeps of u − 1/2."""
+    u = np.concatenate([rng().uniform(0, 1, N), 0.5 + np.exp(rng().uniform(-12, -2, N))]).astype(dtype)
+
+    def pair(u):
+        sin, cos = (2 * u).sin_cos_pi()
+        return cos, sin
+
+    true = np.array([*exact(pair, u)])
+    assert ulps(np.stack(jax.jit(jax.vmap(stable.cos_sin_turn))(u), axis=1), true, dtype) < 2.5
+    plain = jax.jit(lambda u: (jnp.cos(2 * np.pi * u), jnp.sin(2 * np.pi * u)))(u)
+    assert ulps(np.stack(plain, axis=1), true, dtype) > 100
+
+
+def test_cos_sin_turn_of_quarters(dtype):
+    c, s = jax.vmap(stable.cos_sin_turn)(jnp.asarray([0, 0.25, 0.5, 0.75], dtype))
+    np.testing.assert_array_equal(c, [1, 0, -1, 0])
+    np.testing.assert_array_equal(s, [0, 1, 0, -1])
+
+
+def scaled_ierfc(a: arb) -> arb:
+    """exp(a²) ierfc(a)."""
+    return 1 / arb.pi().sqrt() - a * (a * a).exp() * a.erfc()
+
+
+def test_ierfc_coefficients():
+    """The Chebyshev series of √π (1 + 2a²) exp(a²) ierfc(a) in t = (a − 3)/(a + 3), by the discrete cosine transform."""
+    nodes = 96
+    with working(400):
+        angles = [(arb(2 * k + 1) / (2 * nodes)) for k in range(nodes)]
+        t = [angle.cos_pi() for angle in angles]
+        a = [3 * (1 + x) / (1 - x) for x in t]
+        f = [arb.pi().sqrt() * (1 + 2 * x * x) * scaled_ierfc(x) for x in a]
+        true = [
+            sum((y * (j * angle).cos_pi() for y, angle in zip(f, angles, strict=True)), arb(0))
+            * (1 if j == 0 else 2)
+            / nodes
+            for j in range(len(stable._IERFC) + 1)
+        ]
+    np.testing.assert_allclose(stable._IERFC, [float(c.mid()) for c in true[:-1]], rtol=1e-15, atol=1e-19)
+    assert abs(float(true[-1].mid())) < 2**-53  # the first one left out
+
+
+def test_ierfc(dtype):
+    a = np.concatenate([rng().uniform(0, 9, N), [0.0]]).astype(dtype)
+    got = jax.jit(jax.vmap(stable.ierfc))(a)
+    for x, g, t in zip(a, got, exact(lambda a: scaled_ierfc(a) * (-a * a).exp(), a), strict=True):
+        assert ulps([g], [t], dtype) < 4 + x * x  # the exponential makes a²/2 ulp of the rounding of a², and of its own
+
+
+def test_gaussian_tails(dtype):
+    """The two terms of the scaled ierfc agree in all but 1/2a² of themselves: their difference loses as much."""
+    a = np.exp(rng().uniform(-8, 4, N)).astype(dtype)
+    tail, integral = jax.jit(jax.vmap(stable.gaussian_tails))(a)
+    true = exact(scaled_ierfc, a)
+    assert ulps(tail, exact(lambda a: (a * a).exp() * a.erfc(), a), dtype) < 16
+    assert ulps(integral, true, dtype) < 8
+    assert ulps(1 / np.sqrt(np.pi).astype(dtype) - a * np.asarray(tail), true, dtype) > 1e3
+
+
+def test_kepler(dtype):
+    """E − sin E = 2πv; both sides vanish as E³/6, where the plain difference would be 0."""
+    v = np.exp(rng().uniform(-30, np.log(0.5), N)).astype(dtype)
+    E = jax.jit(jax.vmap(stable.kepler))(v)
+
+    def correction(E, v):  # Newton's step from the result is its error
+        return E - (E - E.sin() - 2 * arb.pi() * v) / (1 - E.cos())
+
+    assert ulps(E, exact(correction, E, v), dtype) < 4
+    plain = np.asarray(jax.jit(lambda E: E - jnp.sin(E))(E), np.float64)
+    assert relative(plain, 2 * np.pi * v.astype(np.float64)) > 1e5 * epsilon(dtype)
+
+
+def test_kepler_derivative(dtype):
+    v = np.array([1e-6, 0.1, 0.25, 0.49], dtype)
+    got = numbers(over_rows(lambda v: jax.grad(stable.kepler)(v), {"v": v}))[:, 0]
+    E = np.asarray(jax.vmap(stable.kepler)(v), np.float64)
+    np.testing.assert_allclose(got, 2 * np.pi / (2 * np.sin(E / 2) ** 2), rtol=16 * epsilon(dtype))
+    assert jax.grad(stable.kepler)(jnp.asarray(0, dtype)) == 0
