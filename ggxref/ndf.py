@@ -8,6 +8,7 @@ import math
 
 import jax.numpy as jnp
 
+from ggxref import stable
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import cofactor, length, times
 
@@ -27,7 +28,7 @@ def ggx(wm: Vec3, alpha: Vec2) -> Scalar:
     tokuyoshi2024; dupuy2023 (12); walter2014 (1) with A = diag(αx, αy, 1).
     """
     # A sum of squares: cos²(α² − 1) + 1, its equal on unit vectors, has lost every digit at α = 1e-4.
-    q = _stretched(wm, alpha) + wm[2] ** 2
+    q = stable.stretched_square(wm, alpha)
     D = 1 / (math.pi * (alpha[0] * q) * (alpha[1] * q))
     return jnp.where(wm[2] > 0, D, 0)
 

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jax import Array, lax
 from jaxtyping import Float
 
-from ggxref._types import Real, Scalar, Vec3
+from ggxref._types import Real, Scalar, Vec2, Vec3
 
 Components = Float[Array, " n"] | tuple[Float[Array, "..."], ...]
 
@@ -57,13 +57,19 @@ def widened(function: Callable) -> Callable:
     return in_float32
 
 
+def _collected(products):
+    """The rounded sum of `(value, error)` pairs, and everything that it leaves out."""
+    (total, error), *others = products
+    errors = [error]
+    for value, error in others:
+        total, lost = _two_sum(total, value)
+        errors += [error, lost]
+    return total, errors
+
+
 @jax.custom_jvp
 def _dot(a, b):
-    (total, error), *products = (_two_product(x, y) for x, y in zip(a, b, strict=True))
-    errors = [error]
-    for product, error in products:
-        total, lost = _two_sum(total, product)
-        errors += [error, lost]
+    total, errors = _collected([_two_product(x, y) for x, y in zip(a, b, strict=True)])
     # The products cancel down to their own errors where a is nearly perpendicular to b: these are summed the same way.
     rest = 0
     for error in errors:
@@ -100,10 +106,54 @@ def cross(a: Vec3, b: Vec3) -> Vec3:
     return dot((a[1:4], a[2:5]), (b[2:5], -b[1:4]))
 
 
+@widened
 def excess(w: Vec3) -> Scalar:
-    """By how much the length of `w`, a unit vector before it was rounded, exceeds 1: `(w·w − 1)/2`, to all its digits."""
-    one = jnp.ones_like(w[0])
-    return dot((*w, one), (*w, -one)) / 2
+    """By how much the length of `w`, a unit vector before it was rounded, exceeds 1: `(w·w − 1)/2`, to within ε²."""
+    return _excess(*w)
+
+
+@jax.custom_jvp
+def _excess(x, y, z):
+    total, errors = _collected([_two_product(c, c) for c in (z, x, y)])
+    return ((total - 1) + sum(errors)) / 2
+
+
+@_excess.defjvp
+def _excess_jvp(primals, tangents):
+    return _excess(*primals), sum(c * dc for c, dc in zip(primals, tangents, strict=True))
+
+
+@widened
+def stretched_square(w: Vec3, alpha: Vec2) -> Scalar:
+    r"""$(x^2/\alpha_x^2 + y^2/\alpha_y^2 + z^2) / \|w\|^2$, rounded once; its derivative is that of the numerator.
+
+    D is the inverse of its square: half of D's error came from here, and half of that from a `w` that is unit only to its
+    dtype.
+    """
+    return _stretched_square(w[0], w[1], w[2], alpha[0], alpha[1])
+
+
+def _quotient(x, a):
+    q = x / a
+    p, error = _two_product(q, a)
+    return q, ((x - p) - error) / a
+
+
+@jax.custom_jvp
+def _stretched_square(x, y, z, ax, ay):
+    (p, p_rest), (q, q_rest) = _quotient(x, ax), _quotient(y, ay)
+    total, errors = _collected([_two_product(c, c) for c in (p, q, z)])
+    longer = 2 * _excess(x, y, z)
+    square = jnp.where(longer > -1, 1 + longer, 1)  # ‖w‖², but for the zero vector
+    return total + (sum(errors) + 2 * (p * p_rest + q * q_rest) - total * (longer / square))
+
+
+@_stretched_square.defjvp
+def _stretched_square_jvp(primals, tangents):
+    (x, y, z, ax, ay), (dx, dy, dz, dax, day) = primals, tangents
+    p, q = x / ax, y / ay
+    change = p * ((dx - p * dax) / ax) + q * ((dy - q * day) / ay) + z * dz
+    return _stretched_square(*primals), 2 * change
 
 
 def log1p(x: Scalar) -> Scalar:
