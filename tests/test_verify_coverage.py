@@ -13,16 +13,19 @@ def test_no_number_is_missing_from_the_list(paper, last):
     assert listed[:last] == [f"({k})" for k in range(1, last + 1)]
 
 
-def test_every_place_has_a_check():
-    unproved = [place for place, checks in coverage.proofs(engine.registered()).items() if not checks]
-    assert not unproved
+def test_every_place_has_two_routes():
+    """By two methods, or by one with the reason why there is no other."""
+    methods = {place: {c.method for c in checks} for place, checks in coverage.proofs(engine.registered()).items()}
+    assert all(methods.values())
+    assert {place for place, used in methods.items() if len(used) == 1} == set(coverage.one_route())
 
 
 def test_every_check_has_a_place():
     listed = coverage.places()
     astray = [
-        (c.paper, c.equation)
+        (paper, place)
         for c in engine.registered()
-        if not c.statement.startswith("erratum") and c.equation not in listed[c.paper]
+        for paper, place in c.places
+        if not c.statement.startswith("erratum") and place not in listed[paper]
     ]
     assert not astray

@@ -108,6 +108,15 @@ def test_unknown_selection_says_what_there_is(paper, equation, said):
     assert said in str(raised.value)
 
 
+def test_a_check_stands_at_all_its_places():
+    """The exact form of (6) of heitz2014 states (7) too; a derivative serves equations of two documents."""
+    checks = engine.registered()
+    (shared,) = [c for c in checks if ("tokuyoshi2024", "(18)") in c.also]
+    assert shared.paper == "dupuy2023"
+    assert shared in engine.select(checks, "tokuyoshi2024", "18")
+    assert shared in engine.select(checks, "dupuy2023") and shared in engine.select(checks, "tokuyoshi2024")
+
+
 def test_errata_carry_the_numbers_of_their_check():
     checks = [c for c in engine.registered() if c.statement.startswith("erratum") and c.paper == "walter2014"]
     check = next(c for c in checks if c.equation == "(25)")

@@ -47,6 +47,10 @@ class Batched:
         """
         return Batched(_area_ratio(self.function, argument), self.ranks)
 
+    def derivative(self, argument: int) -> "Batched":
+        """∂f/∂x by forward differentiation with respect to the argument at that position: its axes come last."""
+        return Batched(_derivative(self.function, argument), self.ranks)
+
 
 def batched(name: str) -> Batched:
     """The library's function of that dotted name below `ggxref`, looked up at each call so that it can be replaced."""
@@ -69,6 +73,7 @@ def forget() -> None:
     """Drop the compiled functions, which know nothing of a formula that was replaced since."""
     _compiled.cache_clear()
     _area_ratio.cache_clear()
+    _derivative.cache_clear()
 
 
 def _padded(mapped, block):
@@ -100,3 +105,8 @@ def _area_ratio(function, argument):
         return jnp.linalg.norm(jnp.cross(first, second))
 
     return ratio
+
+
+@cache
+def _derivative(function, argument):
+    return jax.jacfwd(function, argument)

@@ -53,6 +53,7 @@ def visible_density(pdf, jacobian):
 @check(
     "(1)", "‖∂m'/∂m‖ = |det M|/‖Mm‖³, against the derivative of the linear map", "autodiff",
     ["jacobian.linear", "slopes.stretch"], tolerance=ROUNDING,
+    also=[f"tokuyoshi2024 ({k})" for k in (10, 11, 14, 15, 17, 18, 27, 28)],
     mutant=("‖Mm‖² for ‖Mm‖³", lambda f: lambda m, M: f(m, M) * np.linalg.norm(np.einsum("...ij,...j", M, m), axis=-1)),
 )  # fmt: skip
 def linear_jacobian(jacobian, stretch):
@@ -74,7 +75,7 @@ def standard_visible_density(pdf, D):
 
 @check(
     "(3)", "∫ D_std z dm = 1, and GGX at α = 1 is the hemisphere", "quadrature", ["ndf.hemisphere", "ndf.ggx"],
-    tolerance=QUADRATURE, mutant=("1/(2π)", lambda D: lambda m: D(m) / 2),
+    tolerance=QUADRATURE, also=["tokuyoshi2024 (6)"], mutant=("1/(2π)", lambda D: lambda m: D(m) / 2),
 )  # fmt: skip
 def hemisphere_is_normalised(D, D_ggx):
     m = cases.sphere(500)
@@ -118,7 +119,7 @@ def half_vector(half):
 @check(
     "(8)", "‖∂h/∂wo‖ = 1/(4|wo·h|), against the derivative of the half vector", "autodiff",
     ["jacobian.reflection", "geometry.half_reflection"], tolerance=ROUNDING,
-    mutant=("without the 4", lambda f: lambda o, m: 4 * f(o, m)),
+    also=["tokuyoshi2024 (21)", "tokuyoshi2024 (22)"], mutant=("without the 4", lambda f: lambda o, m: 4 * f(o, m)),
 )  # fmt: skip
 def half_vector_jacobian(jacobian, half):
     i, o = cases.pairs(cases.UP, cases.hemisphere(150))
@@ -133,7 +134,7 @@ def half_vector_jacobian(jacobian, half):
 @check(
     "(10)", "f_p = D_vis,std(h) ‖∂h/∂wo‖ is 1/(2π(1 + z_i)) on the cap z_o > -z_i and 0 elsewhere", "exact",
     ["sampling.spherical_cap.cap_pdf", "jacobian.reflection", "sampling.spherical_cap.pdf"], tolerance=ROUNDING,
-    final=True, mutant=("cap limit of the wrong sign", lambda f: lambda o, i: np.where(o[..., 2] > i[..., 2], f(i, i), 0)),
+    final=True, also=["§3.1"], mutant=("cap limit of the wrong sign", lambda f: lambda o, i: np.where(o[..., 2] > i[..., 2], f(i, i), 0)),
 )  # fmt: skip
 def reflected_density(first, jacobian, second, final=False):
     i, o = cases.pairs(cases.ALL, cases.sphere(999))
@@ -179,7 +180,7 @@ def mirror_hemisphere(reflect, stream):
 for _sampler, _place in (("spherical_cap", "listing 3"), ("cross_section", "listing 2")):
 
     @check(
-        _place, f"samples follow D_vis, {_sampler}", "monte_carlo", f"sampling.{_sampler}.sample",
+        _place, f"samples follow D_vis, {_sampler}", "monte_carlo", f"sampling.{_sampler}.sample", also=["listing 1"],
         tolerance=FALSE_ALARM, law=laws.ggx_visible, cases=samplers.VISIBLE, mutant=("axes swapped", swapped),
     )  # fmt: skip
     def samples(sample, **settings):
@@ -187,7 +188,7 @@ for _sampler, _place in (("spherical_cap", "listing 3"), ("cross_section", "list
 
     @check(
         _place, f"the Jacobian of the map u → m is D_vis, {_sampler}", "autodiff",
-        [f"sampling.{_sampler}.pdf", f"sampling.{_sampler}.sample"], tolerance=1e-8, cases=samplers.VISIBLE,
+        [f"sampling.{_sampler}.pdf", f"sampling.{_sampler}.sample"], also=["§1", "§4"], tolerance=1e-8, cases=samplers.VISIBLE,
         mutant=("|M|/‖Mᵀm‖² for its cube", lambda f: lambda m, i, a: f(m, i, a) * np.linalg.norm(np.c_[m[:, :2] / a, m[:, 2]], axis=-1)),
     )  # fmt: skip
     def sampler_jacobian(pdf, sample, **settings):
@@ -300,7 +301,7 @@ def height_correlation(g2, smith, g1):
 
 @check(
     "(15)", "G1 = χ⁺(m·w) z / ∫ max(m·w, 0) D dm", "quadrature", ["masking.g1_ggx", "ndf.ggx"], tolerance=QUADRATURE,
-    mutant=("axes swapped", swapped),
+    also=["(16)", "(17)", "tokuyoshi2024 (7)"], mutant=("axes swapped", swapped),
 )  # fmt: skip
 def masking_is_its_integral(g1, D):
     w, alpha = cases.pairs(cases.UP, cases.ALPHAS)
@@ -328,7 +329,7 @@ def masking_of_hemisphere(g1, standard=False):
 @check(
     "(19)", "the estimator with samples of listing 1 and the density (20) converges to ∫ f_r |cos| dω", "monte_carlo",
     ["sampling.spherical_cap.sample", "bsdf.brdf", "ndf.ggx", "masking.g1_ggx", "masking.g2_height_correlated"],
-    tolerance=FALSE_ALARM, mutant=("axes swapped", swapped),
+    tolerance=FALSE_ALARM, also=["(18)"], mutant=("axes swapped", swapped),
 )  # fmt: skip
 def estimator(sample, brdf, D, g1, g2, stream):
     from ggxref.verify.heitz2014_bsdf import hemispherical
@@ -367,7 +368,7 @@ def outgoing(m, i):
 @check(
     "(18)", "L = ∫ L f_r |cos| dω over directions is ∫ L F G2/G1 D_vis dm over normals, for a radiance that varies", "quadrature",
     ["bsdf.brdf", "ndf.ggx", "masking.g1_ggx", "masking.g2_height_correlated", "sampling.spherical_cap.pdf"], tolerance=1e-4,
-    mutant=("cos θ_b lost", lambda f: lambda i, o, *v: f(i, o, *v) / np.abs(o[:, 2])),
+    also=["(11)", "(19)"], mutant=("cos θ_b lost", lambda f: lambda i, o, *v: f(i, o, *v) / np.abs(o[:, 2])),
 )  # fmt: skip
 def illumination(brdf, D, g1, g2, pdf):
     """Tolerance: over the normals there is a kink where the reflection meets the horizon."""

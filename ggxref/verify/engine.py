@@ -20,17 +20,26 @@ CHECKS = (
     "heitz2014_slopes",
     "heitz2014_bsdf",
     "heitz2014_tables",
+    "heitz2014_cavities",
+    "heitz2014_derivatives",
+    "heitz2014_weights",
     "heitz2014_exact",
     "walter2014",
+    "walter2014_derivatives",
+    "walter2014_areas",
     "walter2014_sampling",
+    "walter2014_laws",
     "walter2014_steps",
     "walter2014_exact",
     "dupuy2023",
+    "dupuy2023_caps",
     "dupuy2023_exact",
     "tokuyoshi2024",
+    "tokuyoshi2024_horizon",
     "tokuyoshi2024_exact",
     "ours",
     "ours_energy",
+    "ours_integrals",
     "misprints",
 )
 METHODS = ("exact", "certified", "quadrature", "autodiff", "monte_carlo")
@@ -91,6 +100,12 @@ class Check:
     change: Callable
     body: Callable
     settings: dict = field(default_factory=dict)
+    also: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def places(self) -> list[tuple[str, str]]:
+        """Where the statement stands: document and equation, the first one and those that say the same."""
+        return [(self.paper, self.equation), *self.also]
 
     def error(self, samples: int, *, control: bool = False) -> float:
         """Error of the check on the formulas, or (`control`) on the wrong one in place of the first."""
@@ -146,25 +161,34 @@ def check(
     *,
     tolerance: float | int,
     mutant: tuple[str, Callable],
+    also: Sequence[str] = (),
     **settings,
 ):
     """Register the decorated body as a check; it may be decorated several times, once for each formula it tests.
 
     - `functions`: what the body is called with: a public name below `ggxref` (given batched, in float64) or a callable.
     - `mutant`: its name, and the change from the first function to a wrong one.
+    - `also`: other places that state what is tested, "(7)" of the same document or "walter2014 (7)" of another.
     - `settings`: further keyword arguments of the body; method "monte_carlo" adds `stream`.
 
     The body returns the error, which must stay within `tolerance` for the formula and not for the mutant.
     """
     names = tuple(functions) if isinstance(functions, list | tuple) else (functions,)
+    others = tuple(_other_place(paper, place) for place in also)
 
     def register(body):
-        _register.append(
-            Check(paper, equation, statement, method, names, float(tolerance), mutant[0], mutant[1], body, settings)
+        found = Check(
+            paper, equation, statement, method, names, float(tolerance), mutant[0], mutant[1], body, settings, others
         )
+        _register.append(found)
         return body
 
     return register
+
+
+def _other_place(paper, place):
+    first, _, rest = place.partition(" ")
+    return (first, rest) if first in PAPERS else (paper, place)
 
 
 def registered() -> list[Check]:
@@ -182,19 +206,18 @@ def _place(equation):
 def select(checks: Iterable[Check], paper: str | None = None, equation: str | None = None) -> list[Check]:
     """The checks of one paper, or of one equation (`5` and `(5)` are the same), or all."""
     chosen = list(checks)
-    if paper is not None:
-        papers = sorted({c.paper for c in chosen})
-        chosen = [c for c in chosen if c.paper == paper]
-        if not chosen:
-            raise InputError(f"--paper: no paper {paper!r}; there are {', '.join(papers)}")
-    if equation is not None:
-        wanted = {equation, f"({equation})"}
-        places = list(dict.fromkeys(c.equation for c in chosen))
-        chosen = [c for c in chosen if c.equation in wanted]
-        if not chosen:
-            where = f" of {paper}" if paper else ""
-            raise InputError(f"--equation: no check{where} for {equation!r}; there are {', '.join(places)}")
-    return chosen
+    if paper is not None and paper not in PAPERS:
+        raise InputError(f"--paper: no paper {paper!r}; there are {', '.join(PAPERS)}")
+
+    def meant(place):
+        return paper in (None, place[0]) and (equation is None or place[1] in {equation, f"({equation})"})
+
+    found = [c for c in chosen if any(map(meant, c.places))]
+    if not found and equation is not None:
+        there = dict.fromkeys(place for c in chosen for p, place in c.places if paper in (None, p))
+        where = f" of {paper}" if paper else ""
+        raise InputError(f"--equation: no check{where} for {equation!r}; there are {', '.join(there)}")
+    return found
 
 
 def run(checks: Iterable[Check], samples: int = SAMPLES, threads: int = 2) -> Iterator[Record]:

@@ -71,7 +71,7 @@ def btdf_is_reciprocal(btdf, D, g1, g2, fresnel, refract):
 @check(
     "(4)", "white furnace: ∫ f_r |wo·n| dwo over directions = ∫ F G2/G1 D_wi over normals, and ≤ 1", "quadrature",
     REFLECT, tolerance=1e-5,
-    mutant=("2 for 4 in f_r", lambda f: lambda *v: 2 * f(*v)),
+    also=["§2.1 f_r"], mutant=("2 for 4 in f_r", lambda f: lambda *v: 2 * f(*v)),
 )  # fmt: skip
 def reflected_energy(brdf, D, g1, g2, fresnel):
     """Tolerance: over the normals the integrand has a kink where the reflection meets the horizon."""
@@ -100,7 +100,7 @@ def hemispherical(f, i, n=64):
 @check(
     "(4)", "energy is conserved: reflected + transmitted ≤ 1, nearly 1 on a smooth surface", "quadrature",
     [*TRANSMIT, "bsdf.brdf", "geometry.refract"], tolerance=1e-3,
-    mutant=("F for 1 - F", lambda f: lambda i, o, a, b, D, G, F: f(i, o, a, b, D, G, 1 - F)),
+    also=["§2.1 f_t"], mutant=("F for 1 - F", lambda f: lambda i, o, a, b, D, G, F: f(i, o, a, b, D, G, 1 - F)),
 )  # fmt: skip
 def energy_is_conserved(btdf, D, g1, g2, fresnel, brdf, refract):
     """At α = 0.01 and up to 60° little is masked: at most 3e-4."""

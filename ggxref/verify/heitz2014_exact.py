@@ -68,6 +68,18 @@ def masking_is_its_integral(g1, integrated):
             yield g1(exact(w), exact(w), exact(alpha)), integrated(w, alpha)
 
 
+for _name, _g1 in (("ggx", integrate.g1_ggx), ("beckmann", integrate.g1_beckmann)):
+
+    @certified(
+        "§2.1 Λ", f"1 + Λ is ∫ ⟨wi·m⟩ D dm/(wi·n), {_name}, enclosed", [f"oracle.masking.lambda_{_name}", partial(_g1, bits=BITS)],
+        mutant=("without the half", lambda f: lambda w, a: 2 * f(w, a)),
+    )  # fmt: skip
+    def smith_lambda(smith, integrated):
+        for w in DIRECTIONS:
+            for alpha in ALPHAS:
+                yield 1 + smith(exact(w), exact(alpha)), 1 / integrated(w, alpha)
+
+
 @certified(
     "appendix B", "∫ D_wi = 1 for V-cavities of GGX, by the marginal slope, enclosed", lambda tan: lambda psi: 1 - psi.tan() / tan,
     mutant=("2 also where both are seen", lambda f: lambda tan: lambda psi: 2 * psi.cos() ** 0),
@@ -220,7 +232,7 @@ for _name in ("ggx", "beckmann"):
         "(6)", f"D_wi = P22_wi/(m·n)³, and (7) P22_wi = χ⁺(s) s P22/σ with s = -x_i x̃ - y_i ỹ + z_i, {_name}",
         [f"oracle.slopes.visible_{_name}", f"oracle.slopes.{_name}", f"oracle.ndf.{_name}", f"oracle.masking.sigma_{_name}",
          "oracle.slopes.from_normal"],
-        mutant=("(7) as printed", lambda f: lambda s, i, a: f((-s[0], -s[1]), i, a)),
+        also=["(7)"], mutant=("(7) as printed", lambda f: lambda s, i, a: f((-s[0], -s[1]), i, a)),
     )  # fmt: skip
     def visible_slopes(P22_i, P22, D, sigma, from_normal):
         for i, m in fronts():

@@ -36,6 +36,7 @@ def identity(
     *,
     mutant: tuple[str, Callable],
     method: str = "exact",
+    also: Sequence[str] = (),
 ):
     """Register the decorated body, which yields pairs of sides (balls or tuples of balls), as a check of the oracle."""
 
@@ -44,7 +45,7 @@ def identity(
             with _PRECISION, working(BITS):
                 return max(distance(*sides) for sides in body(*formulas))
 
-        engine.check(paper, equation, statement, method, functions, tolerance=PROVEN, mutant=mutant)(error)
+        engine.check(paper, equation, statement, method, functions, tolerance=PROVEN, mutant=mutant, also=also)(error)
         return body
 
     return register

@@ -70,7 +70,7 @@ def brdfs_are_reciprocal(brdf, *formulas):
 @check(
     "BRDFs", "weak white furnace: ∫ D G1(wi) /(4|wi·n|) dwo over the sphere is 1, or the clamp's loss", "quadrature",
     ["bsdf.brdf", *MODELS, "masking.g1_v_cavity", "geometry.reflect", "jacobian.reflection"], tolerance=1e-10,
-    mutant=("2 for 4", lambda f: lambda *v: 2 * f(*v)),
+    also=["walter2014 (4)"], mutant=("2 for 4", lambda f: lambda *v: 2 * f(*v)),
 )  # fmt: skip
 def weak_furnace(brdf, *formulas):
     """Over micronormals, with the reflection's Jacobian; the skewed ellipsoid's G1 is clamped, so that it may lose energy."""

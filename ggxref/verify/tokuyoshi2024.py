@@ -60,7 +60,7 @@ def normals_are_normalised(D):
 
 @check(
     "(4)", "Λ = (-1 + √(1 + (α_x²x² + α_y²y²)/z²))/2 is the mean area hidden: ∫ max(-w·m, 0) D dm / z", "quadrature",
-    ["masking.lambda_ggx", "ndf.ggx", "masking.g1_ggx"], tolerance=1e-10, mutant=("axes swapped", swapped),
+    ["masking.lambda_ggx", "ndf.ggx", "masking.g1_ggx"], tolerance=1e-10, also=["(3)"], mutant=("axes swapped", swapped),
 )  # fmt: skip
 def hidden_area(smith, D, g1):
     """Smith's Λ by its definition; (3) G1 = 1/(1 + Λ) with it. Tolerance: Λ is small against 1 near the normal."""
@@ -199,6 +199,7 @@ def bounded_samples(sample, **settings):
 @check(
     "(40)", "the Jacobian of the map u → m is p_bound", "autodiff",
     ["sampling.bounded_cap.pdf", "sampling.bounded_cap.sample"], tolerance=1e-8, cases=samplers.VISIBLE,
+    also=["(42)"],
     mutant=("D_vis: k = 1", lambda f: lambda m, i, a: f(m, i, a) * (1 + literal_k(i, a) * warp(i, a)[..., 2]) / (1 + warp(i, a)[..., 2])),
 )  # fmt: skip
 def bounded_jacobian(pdf, sample, **settings):

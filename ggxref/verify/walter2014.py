@@ -192,7 +192,7 @@ def surface_areas(u, v, A):
 @check(
     "(26)", "projected area π C_e² ‖A u‖/|A| against the surface integral (21)", "quadrature",
     "ellipsoid.projected_area", tolerance=QUADRATURE,
-    mutant=("‖A⁻¹u‖", lambda f: lambda u, A, C: f(u, np.linalg.inv(A), C)),
+    also=["(21)"], mutant=("‖A⁻¹u‖", lambda f: lambda u, A, C: f(u, np.linalg.inv(A), C)),
 )  # fmt: skip
 def projected_areas(projected_area):
     u, A = cases.pairs(cases.ALL, cases.SHAPES)
@@ -201,7 +201,7 @@ def projected_areas(projected_area):
 
 @check(
     "(28)", "lune area π C_e² (‖Au‖‖Av‖ + Au·Av)/(2|A|‖Av‖) against the surface integral (27)", "quadrature",
-    "ellipsoid.lune_area", tolerance=QUADRATURE, mutant=("u and v exchanged", lambda f: lambda u, v, A, C: f(v, u, A, C)),
+    "ellipsoid.lune_area", tolerance=QUADRATURE, also=["(27)"], mutant=("u and v exchanged", lambda f: lambda u, v, A, C: f(v, u, A, C)),
 )  # fmt: skip
 def lune_areas(lune_area):
     u, v, A = cases.triples(cases.ALL, cases.UP[:3], cases.SHAPES)

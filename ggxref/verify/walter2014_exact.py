@@ -309,13 +309,24 @@ def projected_area_integral(projected_area):
 
 @certified(
     "(27)", "the integral over the lune, A_ℓ⊥(u, v), also of nearly opposite u and v, enclosed", "oracle.ellipsoid.lune_area",
-    mutant=("u and v exchanged", lambda f: lambda u, v, A, C: f(v, u, A, C)),
+    also=["ours lune areas"], mutant=("u and v exchanged", lambda f: lambda u, v, A, C: f(v, u, A, C)),
 )  # fmt: skip
 def lune_area_integral(lune_area):
     for A in shapes():
         for u in directions():
             for v in (N, normalise(add(minus(u), exact((0, 0.0625, 0.0625))))):
                 yield lune_area(u, v, A, SIZE), lune_integral(u, v, A)
+
+
+@certified(
+    "§2.3", "π/2 (1 + cos θ) is the integral over the spherical lune of its foreshortening, enclosed", lambda cos: arb.pi() / 2 * (1 + cos),
+    mutant=("π/2 (1 + cos²θ)", lambda f: lambda cos: f(cos**2)),
+)  # fmt: skip
+def spherical_lune(area_):
+    sphere = exact(((1, 0, 0), (0, 1, 0), (0, 0, 1)))
+    for u in directions():
+        for v in (N, minus(N)):
+            yield area_(dot(u, v)), lune_integral(u, v, sphere) / SIZE**2
 
 
 @identity(

@@ -61,7 +61,7 @@ def lune_samples(sample, **settings):
 @check(
     "(46)", "version 3: the Jacobian of the map ξ → m is p_h", "autodiff",
     ["sampling.lune.pdf", "sampling.lune.sample"], tolerance=1e-8, cases=samplers.ELLIPSOIDS,
-    mutant=("without χ₊ or σ", lambda p: lambda m, i, A: p(m, i, A) / np.linalg.norm(A[..., 2])),
+    also=["§4"], mutant=("without χ₊ or σ", lambda p: lambda m, i, A: p(m, i, A) / np.linalg.norm(A[..., 2])),
 )  # fmt: skip
 def lune_jacobian(pdf, sample, **settings):
     return samplers.density_is_jacobian(pdf, sample, **settings)
@@ -157,7 +157,7 @@ def whole_share(i, A):
     "(50)", "weight f_r |ω·n|/p_o = G1 G1 F A_ℓ⊥(ψ, n)/(|ψ·n| A_e⊥(n))", "exact",
     ["bsdf.brdf", "ndf.ellipsoid", "masking.g1_ellipsoid", "sampling.lune.pdf", "jacobian.reflection",
      "ellipsoid.lune_area", "ellipsoid.projected_area"],
-    tolerance=1e-11, mutant=("2 for 4 in f_r", lambda f: lambda *v: 2 * f(*v)),
+    tolerance=1e-11, also=["(49)"], mutant=("2 for 4 in f_r", lambda f: lambda *v: 2 * f(*v)),
 )  # fmt: skip
 def weights(brdf, D, g1, pdf, jacobian, lune_area, projected_area):
     i, o, A = cases.triples(cases.UP, cases.hemisphere(100), cases.SHAPES)
@@ -188,7 +188,7 @@ def weights_are_bounded(g1, lune_area, projected_area):
 
 @check(
     "§4.2", "with A = diag(α_x, α_y, 1) the lune sampler follows GGX's visible normals", "monte_carlo",
-    "sampling.lune.sample", tolerance=FALSE_ALARM, mutant=("x and y of the ellipsoid exchanged", swapped),
+    "sampling.lune.sample", tolerance=FALSE_ALARM, also=["(2)"], mutant=("x and y of the ellipsoid exchanged", swapped),
 )  # fmt: skip
 def lune_samples_ggx(sample, stream):
     v = []

@@ -81,7 +81,7 @@ def disk_is_uniform(to_disk, stream):
 
 @check(
     "(36)", "the concentric map keeps areas: |∂(x, y)/∂ξ| = π", "autodiff", DISK, tolerance=1e-11,
-    mutant=("polar radius ξ", lambda f: Batched(lambda u: u[0] * jnp.stack([jnp.cos(6 * u[1]), jnp.sin(6 * u[1])]), (1,))),
+    also=["(37)"], mutant=("polar radius ξ", lambda f: Batched(lambda u: u[0] * jnp.stack([jnp.cos(6 * u[1]), jnp.sin(6 * u[1])]), (1,))),
 )  # fmt: skip
 def disk_keeps_area(to_disk):
     return relative(to_disk.area_ratio(0)(samplers.lattice(1000)), np.pi)
@@ -89,7 +89,7 @@ def disk_keeps_area(to_disk):
 
 @check(
     "(37)", "the concentric map takes squares about the centre to circles: x² + y² = max(a², b²)", "exact", DISK,
-    tolerance=ROUNDING, mutant=("sine and cosine exchanged in y", lambda f: lambda u: f(u)[:, ::-1] * [1, 0] + f(u) * [0, 1]),
+    tolerance=ROUNDING, also=["(36)"], mutant=("sine and cosine exchanged in y", lambda f: lambda u: f(u)[:, ::-1] * [1, 0] + f(u) * [0, 1]),
 )  # fmt: skip
 def disk_circles(to_disk):
     u = samplers.lattice(1000)
@@ -213,7 +213,7 @@ def reflected(reflect, sample):
 @check(
     "(49)", "the mean of the weight f_r |ω·n|/p_o is the albedo ∫ f_r |ω·n| dω", "monte_carlo",
     ["sampling.lune.pdf", "sampling.lune.sample", "bsdf.brdf", "ndf.ellipsoid", "masking.g1_ellipsoid", "jacobian.reflection"],
-    tolerance=FALSE_ALARM, mutant=("p_h for p_o: Jacobian lost", lambda p: lambda m, i, A: p(m, i, A) * 4 * dot(i, m)),
+    tolerance=FALSE_ALARM, also=["(4)"], mutant=("p_h for p_o: Jacobian lost", lambda p: lambda m, i, A: p(m, i, A) * 4 * dot(i, m)),
 )  # fmt: skip
 def mean_weight(pdf, sample, brdf, D, g1, jacobian, stream):
     from ggxref.verify.heitz2014_bsdf import hemispherical
