@@ -63,17 +63,23 @@ def verify(
         bool,
         typer.Option("--mutants", help="Put wrong formulas in the library's place and show which check kills each."),
     ] = False,
+    pages: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write equations.md and errata.md from all checks, if they pass.")
+    ] = None,
     json: Annotated[Path | None, typer.Option(metavar="PATH", help="Write the records and errata here too.")] = None,
 ) -> None:
     """Prove the formulas numerically, each beside a wrong one that must fail."""
     from ggxref.verify import engine, errata, report
+    from ggxref.verify import pages as write
 
     if json and not json.parent.is_dir():
         raise InputError(f"--json: {json} cannot be written: there is no directory {json.parent}")
+    if pages and not pages.is_dir():
+        raise InputError(f"--pages: there is no directory {pages}")
     checks = engine.select(engine.registered(), paper, equation)
+    if (paper or equation) and (mutants or pages):
+        raise InputError(f"{'--mutants' if mutants else '--pages'}: takes all checks; leave out --paper and --equation")
     if mutants:
-        if paper or equation:
-            raise InputError("--mutants: takes all checks; leave out --paper and --equation")
         return _hunt(checks, samples, json)
     start, records = perf_counter(), []
     with _progress("checks", len(checks)) as advance:
@@ -86,6 +92,9 @@ def verify(
         write_atomically(json, report.document(records, errata.found(records), seconds))
     if not all(r.good for r in records):
         raise typer.Exit(1)
+    if pages:
+        write_atomically(pages / "equations.md", write.equations(checks))
+        write_atomically(pages / "errata.md", write.misprints(records))
 
 
 def _hunt(checks: list, samples: int, json: Path | None) -> None:

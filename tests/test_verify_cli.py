@@ -2,6 +2,7 @@
 
 import json
 from functools import wraps
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -40,15 +41,20 @@ def test_wrong_formula_exits_1(monkeypatch):
     assert "above the tolerance" in result.output
 
 
+DOCS = Path(__file__).parent.parent / "docs"
+
+
 @pytest.mark.slow
-def test_every_check_passes_and_every_control_is_caught(tmp_path):
-    """At an eighth of the samples, which the controls' power allows."""
+def test_every_check_passes_and_the_pages_are_fresh(tmp_path):
+    """At an eighth of the samples, which the controls' power allows. Stale pages: ggxref verify --pages docs"""
     path = tmp_path / "report.json"
-    result = verify("--samples", "8192", "--json", str(path))
+    result = verify("--samples", "8192", "--json", str(path), "--pages", str(tmp_path))
     assert result.exit_code == 0, result.output
     value = json.loads(path.read_text())
     assert len(value["errata"]) >= 30
     assert all(c["passed"] and c["control"]["caught"] for c in value["checks"])
+    for page in ("equations.md", "errata.md"):
+        assert (tmp_path / page).read_text("utf-8") == (DOCS / page).read_text("utf-8")
 
 
 @pytest.mark.parametrize(
@@ -59,6 +65,8 @@ def test_every_check_passes_and_every_control_is_caught(tmp_path):
         (["--samples", "7"], "4096"),
         (["--samples", "many"], "integer"),
         (["--json", "/nowhere/at/all.json"], "there is no directory"),
+        (["--pages", "/nowhere"], "there is no directory"),
+        (["--pages", ".", "--paper", "walter2014"], "--pages: takes all checks"),
     ],
 )
 def test_bad_usage_exits_2_and_says_why(args, said):

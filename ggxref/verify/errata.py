@@ -1,7 +1,7 @@
 """Misprints of the documents. Each is a check: it passes for the corrected form, and its control is the printed form."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from ggxref.verify import engine
 from ggxref.verify.engine import Record
@@ -47,22 +47,15 @@ def erratum(
     )
 
 
+def shown(records: Sequence[Record]) -> list[tuple[Erratum, Record]]:
+    """The misprints whose checks were run, in their order, with what those found."""
+    by_name = {(r.paper, r.statement): r for r in records}
+    return [(e, by_name[e.paper, e.statement]) for e in _errata if (e.paper, e.statement) in by_name]
+
+
 def found(records: Sequence[Record]) -> list[dict]:
     """The misprints among the checks that were run, with the numbers that show them."""
-    by_name = {(r.paper, r.statement): r for r in records}
-    listed = []
-    for e in _errata:
-        record = by_name.get((e.paper, e.statement))
-        if record is not None:
-            fields = {
-                "paper": e.paper,
-                "place": e.place,
-                "printed": e.printed,
-                "correct": e.correct,
-                "origin": e.origin,
-            }
-            listed.append({**fields, "evidence": evidence(record)})
-    return listed
+    return [{**asdict(entry), "evidence": evidence(record)} for entry, record in shown(records)]
 
 
 def evidence(r: Record) -> str:
