@@ -15,8 +15,8 @@ def test_equations_are_fresh():
 def test_every_place_begins_a_row():
     page = pages.equations(engine.registered())
     for listed in coverage.places().values():
-        for place, says in listed.items():
-            assert f"| {place} | {says}".replace("| ", "\0").replace("|", "\\|").replace("\0", "| ") in page
+        for place in listed:
+            assert f"\n| {place} | " in page
 
 
 def test_misprint_shows_both_numbers():
