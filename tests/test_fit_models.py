@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 from ggxref import fresnel, geometry, masking, slopes
 from ggxref.errors import InputError
-from ggxref.fit import models, objectives, parameters, solver, student
+from ggxref.fit import levenberg, models, parameters, rows, solver, student
 from ggxref.fit.models import Surface
 
 NAMES = parameters.names(("brdf",))
@@ -59,9 +59,8 @@ def test_slope_density_is_the_librarys():
 def test_the_logarithm_of_the_density(tail):
     near, far = np.random.default_rng(2).normal(scale=0.3, size=(2, 50)), np.full((2, 1), 30.0)
     with solver.float64():
-        found = [
-            jax.vmap(models.log_slope_density, (None, -1, None))(jnp.asarray(THETA), at, tail) for at in (near, far)
-        ]
+        log_density = jax.vmap(models.log_slope_density, (None, -1, None))
+        found = [log_density(jnp.asarray(THETA), jnp.asarray(at), tail) for at in (near, far)]
         expected = np.log(models.slope_densities(THETA, near, tail))
     assert_allclose(found[0], expected, rtol=SAME)
     assert np.isfinite(found[1]).all()
@@ -125,18 +124,94 @@ def test_principal_axes():
     assert_allclose(values["rotation"], np.arctan2(axis[1], axis[0]), rtol=1e-12)
 
 
-def test_half_the_squared_residual_is_the_loss():
-    degrees = fit_data.angles()[::7]
-    measured = np.abs(np.random.default_rng(0).normal(1, 0.5, size=(2, len(degrees))))
-    theta = jnp.asarray(np.r_[THETA[:6], THETA[6], THETA[6], THETA[7], THETA[7]])
-    samples = (*directions(degrees), measured, np.full(len(degrees), 0.01))
-    with solver.float64():
-        samples = tuple(jnp.asarray(array) for array in samples)
-        objective = objectives.reflectance(Surface())
-        assert objective.residual
-        residuals = jax.vmap(objective.residual, (None, -1), -1)(theta, samples)
-        losses = jax.vmap(objective.loss, (None, -1))(theta, samples)
-    assert_allclose(np.sum(np.asarray(residuals) ** 2, axis=0) / 2, losses, rtol=1e-12)
+class TestRows:
+    """The compiled call's losses and derivatives against the plain formula's, for two bands."""
+
+    DEGREES = fit_data.angles()[::7]
+    MEASURED = np.abs(np.random.default_rng(0).normal(1, 0.5, size=(2, len(DEGREES))))
+    BANDS = np.r_[THETA[:6], THETA[6], THETA[6] + 1, THETA[7], THETA[7] - 1]
+
+    def rows(self):
+        count = len(self.DEGREES)
+        index = np.pad(np.arange(count), (0, rows.ROW - count), constant_values=-1)[None]
+        samples = (*directions(self.DEGREES), self.MEASURED, np.full(count, 0.01))
+        return rows.Rows(
+            tuple(np.moveaxis(a[..., index], -2, 0) for a in samples),
+            np.where(index >= 0, 1.5, 0.0),
+            index,
+            np.zeros(1, int),
+        )
+
+    def loss(self, theta):
+        """Σ weights · mean over bands of √(1 + r²) − 1."""
+        wi, wo, wm = directions(self.DEGREES)
+        with solver.float64():
+            model = models.brdfs(theta, wi, wo, wm, Surface())
+        r = np.log((model * wo[2] + 0.01) / (self.MEASURED * wo[2] + 0.01))
+        return 1.5 * np.sum(np.mean(np.sqrt(1 + r * r) - 1, axis=0))
+
+    def test_losses_and_gradients(self):
+        some = self.rows()
+        found = rows.each(Surface(), self.BANDS[None], some, np.zeros(1, int), some.weights)[0]
+        assert_allclose((found.losses.mean(axis=1) * some.weights).sum(), self.loss(self.BANDS), rtol=1e-12)
+        step = 1e-6 * np.eye(len(self.BANDS))
+        slope = [(self.loss(self.BANDS + s) - self.loss(self.BANDS - s)) / 2e-6 for s in step]
+        # Differences over 1e-6 keep ten digits of a loss of order 100.
+        assert_allclose(found.scores.sum(axis=-1)[0], slope, rtol=1e-6, atol=1e-6)
+
+    def test_the_matrices_at_a_perfect_fit_are_the_hessian(self):
+        """There r = 0, so that both weights are 1 and what they leave out is 0."""
+        some = self.rows()
+        wi, wo, wm = directions(self.DEGREES)
+        with solver.float64():
+            exact = models.brdfs(self.BANDS, wi, wo, wm, Surface())
+        some.samples[3][0, :, : exact.shape[1]] = exact
+        found = rows.each(Surface(), self.BANDS[None], some, np.zeros(1, int), some.weights)[0]
+        assert_allclose(found.hessian, found.bread, rtol=1e-12)
+        step = 1e-5 * np.eye(len(self.BANDS))
+        ahead, behind = (
+            np.stack([rows.each(Surface(), (self.BANDS + sign * s)[None], some, np.zeros(1, int), some.weights)[0]
+                      .scores.sum(axis=-1)[0] for s in step]) for sign in (1, -1)
+        )  # fmt: skip
+        assert_allclose(found.hessian[0], (ahead - behind) / 2e-5, rtol=1e-6, atol=1e-6 * np.abs(found.hessian).max())
+
+    def test_calls_in_pieces_are_the_same(self):
+        some = self.rows()
+        many = np.zeros(2 * rows.CALL + 3, int)
+        theta = self.BANDS + 0.01 * np.arange(len(many))[:, None]
+        pieces = rows.each(Surface(), theta, some, many, some.weights[many])
+        alone = rows.each(Surface(), theta[-1:], some, many[:1], some.weights)[0]
+        assert [len(piece.losses) for piece in pieces] == [rows.CALL, rows.CALL, 3]
+        assert_allclose(pieces[-1].scores[-1], alone.scores[0], rtol=1e-12)
+
+
+class TestLevenberg:
+    """Rosenbrock's valley, as residuals (10 (y − x²), 1 − x), from several places at once."""
+
+    def terms(self, theta, lanes):
+        x, y = theta.T
+        r = np.stack([10 * (y - x * x), 1 - x], axis=-1)
+        J = np.stack([np.stack([-20 * x, np.full_like(x, 10)], -1), np.stack([-np.ones_like(x), 0 * x], -1)], -2)
+        return levenberg.Terms((r * r).sum(-1) / 2, np.einsum("lri,lr->li", J, r), np.einsum("lri,lrj->lij", J, J))
+
+    def test_all_lanes_arrive(self):
+        starts = np.array([[-1.2, 1.0], [2.0, 2.0], [0.0, -1.0]])
+        found = levenberg.minimise(
+            self.terms, starts, np.tile(np.eye(2), (3, 1, 1)), np.full(3, 100), settled=1e-3, most=100
+        )
+        assert found.met.all()
+        assert_allclose(found.theta, 1, atol=1e-6)
+
+    def test_a_held_direction_stays(self):
+        basis = np.diag([1.0, 0.0])[None]
+        found = levenberg.minimise(self.terms, np.array([[0.5, 0.25]]), basis, np.full(1, 100), settled=1e-6, most=100)
+        assert found.met[0] and found.theta[0, 1] == 0.25
+
+    def test_too_few_steps_are_said(self):
+        basis = np.eye(2)[None]
+        assert not levenberg.minimise(
+            self.terms, np.array([[-1.2, 1.0]]), basis, np.full(1, 100), settled=1e-3, most=3
+        ).met[0]
 
 
 class TestStudent:
@@ -152,10 +227,10 @@ class TestStudent:
         with solver.float64():
             expected = jax.vmap(slopes.sigma_ggx, (-1, None))(jnp.asarray(self.W), jnp.ones(2))
         # Below the horizon the area is what cancels in z + ‖(x, y, z)‖.
-        assert_allclose(self.area(2.0), expected, rtol=1e-12, atol=1e-14)
+        assert_allclose(self.area(2.0), expected, rtol=1e-11, atol=1e-11)
 
     @pytest.mark.parametrize(
-        ("gamma", "accuracy"), [(1.51, 1e-9), (1.7, 1e-9), (3.0, 1e-9), (10.0, 1e-8), (30.0, 1e-4)]
+        ("gamma", "accuracy"), [(1.51, 1e-9), (1.7, 1e-9), (3.0, 1e-9), (10.0, 1e-9), (30.0, 1e-9)]
     )
     def test_it_is_the_partial_mean_of_students_t(self, gamma, accuracy):
         x, y, z = self.W

@@ -99,7 +99,7 @@ class TestReflectance:
         assert ladder.chosen == model
 
     def test_starts_agree(self, ladder):
-        assert all(fit.agreeing[0] >= 3 for fit in ladder.fits)
+        assert all(fit.agreeing[0] >= 2 for fit in ladder.fits)
 
 
 @pytest.fixture(scope="module")
@@ -274,7 +274,9 @@ class TestSpread:
 
     def test_a_valley_is_no_point(self):
         flat = Curvature(np.diag([1.0, 0.0]), np.random.default_rng(5).normal(size=(50, 2)))
-        assert not spread(flat, self.space(2)).point
+        assert spread(flat, self.space(2)).valley.tolist() == [0, 1]
+        round = Curvature(np.diag([1.0, 0.5]), flat.scores)
+        assert not spread(round, self.space(2)).valley.any()
 
     def test_a_gradient_left_over_shows(self):
         scores = np.random.default_rng(6).normal(size=(50, 1))

@@ -3,24 +3,24 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 
 from ggxref.errors import InputError
-from ggxref.fit import parameters, selection, solver
+from ggxref.fit import likelihood, lobes, parameters, selection
 from ggxref.fit.data import Heights, Reflectance
+from ggxref.fit.found import Found
 from ggxref.fit.models import Surface
-from ggxref.fit.objectives import Objective
 from ggxref.fit.parameters import Model, Space
 from ggxref.fit.problem import FEWEST, Problem, from_reflectance, from_surface
-from ggxref.fit.uncertainty import Spread, curvature, spread
+from ggxref.fit.uncertainty import Spread, spread
 
 SETTLED = 0.01
 """Standard errors: a minimum is found when the Newton step that is left is shorter."""
-AGREE = 1e-5
-"""Starts agree when their losses, of order 1, do."""
+IN_VALLEY = 0.2
+"""Share of the largest entry of a valley's direction from which a parameter is named."""
+COMPILED = 2e5
+"""Samples below which compiling a formula of its own for GGX's tail takes longer than it saves."""
 AUTO = "auto"
 TAILS = ("ggx", "student_t")
 """What "auto" tries: GGX, and the tail free. Beckmann is the limit of the second; asked for, it is tried by itself."""
@@ -30,10 +30,10 @@ TAILS = ("ggx", "student_t")
 class Fit:
     """One model's minimum.
 
-    - `tail`: the formula used. `space`: the model's free directions; `theta`: (p,), see `parameters`; `covariance` of θ, (p, p).
-    - `values`, `errors`: of the parameters and of what follows from them, by name, in the user's terms.
-    - `loss`: the mean that was minimised; `held_out`: the same on each fold, fitted without it.
-    - `log_rmse`: of reflectance, over positive samples; NaN for slopes.
+      - `tail`: the formula used. `space`: the model's free directions; `theta`: (p,), see `parameters`; `covariance` of θ, (p, p).
+      - `values`, `errors`: of the parameters and of what follows from them, by name, in the user's terms.
+      - `loss`: the mean that was minimised; `held_out`: the same on each fold, fitted without it.
+      - `log_rmse`: of reflectance, over positive samples; NaN for slopes.
     - `agreeing`: how many starts, of how many, found this minimum. `trouble`: why the fit cannot be relied on, or "".
     """
 
@@ -49,6 +49,10 @@ class Fit:
     bic: float
     log_rmse: float
     agreeing: tuple[int, int]
+    intervals: dict[str, tuple[float, float]]
+    correlation: np.ndarray
+    at_bound: tuple[str, ...]
+    residuals: np.ndarray
     trouble: str
 
 
@@ -153,32 +157,42 @@ def _fixed(fixed: Mapping[str, float], known: tuple[str, ...]) -> dict[str, floa
 
 
 def fit_models(problem: Problem, wanted: Sequence[Model], fixed: Mapping[str, float]) -> tuple[Fit, ...]:
-    """Every wanted model from every start, then its standard errors and its loss on each fold fitted without it."""
-    # GGX is the Student-t tail held at γ = 2: where both are wanted, one compiled formula serves them. After the first, a
-    # model starts from half as many places, and from the model before it, which it mostly holds.
-    free_tail = any(model.tail == "student_t" for model in wanted)
-    fits: list[Fit] = []
-    with solver.float64():
-        samples = tuple(jnp.asarray(array) for array in problem.samples)
-        for model in wanted:
-            tail = "student_t" if free_tail and model.tail == "ggx" else model.tail
-            starts = np.stack([*problem.starts[:: 2 if fits else 1], *(fit.theta for fit in fits[-1:])])
-            fits.append(_fit(problem, samples, model, tail, fixed, starts))
-    return tuple(fits)
+    """Every wanted model, with its standard errors and its loss on each fold fitted without it."""
+    return fit_many([problem], wanted, [fixed])[0]
 
 
-def _fit(
-    problem: Problem, samples: tuple, model: Model, tail: str, fixed: Mapping[str, float], starts: np.ndarray
-) -> Fit:
-    objective = problem.objective(tail)
-    space = parameters.space(model.groups, problem.parameters, fixed, problem.scale)
-    found = _from_starts(problem, objective, samples, space, starts)
+def fit_many(
+    problems: Sequence[Problem], wanted: Sequence[Model], fixed: Sequence[Mapping[str, float]]
+) -> list[tuple[Fit, ...]]:
+    """`fit_models` of several problems with the same parameters, side by side where they are of reflectance."""
+    # GGX is the Student-t tail held at γ = 2: where both are wanted of little data, one compiled formula serves them. After
+    # the first, a model starts from a third as many places, and from the model before it, which it mostly holds.
+    little = sum(problem.size for problem in problems) < COMPILED and problems[0].surface is not None
+    shared = little and any(model.tail == "student_t" for model in wanted)
+    bank = lobes.bank(list(problems)) if problems[0].surface else None
+    fits: list[list[Fit]] = [[] for _ in problems]
+    for model in wanted:
+        tail = "student_t" if shared and model.tail == "ggx" else model.tail
+        spaces = [
+            parameters.space(model.groups, problem.parameters, held, problem.scale)
+            for problem, held in zip(problems, fixed, strict=True)
+        ]
+        starts = [
+            np.stack([*problem.starts[:: 3 if so_far else 1], *(fit.theta for fit in so_far[-1:])])
+            for problem, so_far in zip(problems, fits, strict=True)
+        ]
+        if bank:
+            found = lobes.solve(bank, tail, spaces, starts)
+        else:
+            found = [likelihood.solve(*each) for each in zip(problems, [tail] * len(fits), spaces, starts, strict=True)]
+        for problem, space, each, so_far in zip(problems, spaces, found, fits, strict=True):
+            so_far.append(_fit(problem, model, tail, space, each))
+    return [tuple(each) for each in fits]
 
-    def by_block(theta):
-        return np.bincount(problem.block, problem.weights * solver.losses(objective, theta, samples))
 
-    at = curvature(by_block, found.theta, space)
-    wide = spread(at, space)
+def _fit(problem: Problem, model: Model, tail: str, space: Space, found: Found) -> Fit:
+    wide = spread(found.at, found.space)
+    at_bound = parameters.at_bounds(space, found.theta, problem.parameters)
     values, errors = parameters.report(found.theta, wide.covariance, problem.parameters)
     return Fit(
         model=model,
@@ -189,47 +203,22 @@ def _fit(
         values=values,
         errors=errors,
         loss=found.loss,
-        held_out=selection.held_out(problem, objective, samples, space, found.theta, at),
+        held_out=found.held_out,
         bic=selection.bic(problem, found.loss, space.size),
-        log_rmse=_log_rmse(problem, objective, samples, found.theta),
-        agreeing=(found.agreeing, len(starts)),
-        trouble=_trouble(found.met, wide),
+        log_rmse=float(np.sqrt(np.nanmean(found.residuals**2))) if problem.surface else math.nan,
+        agreeing=found.agreeing,
+        intervals=parameters.intervals(found.theta, wide.covariance, problem.parameters, len(found.at.scores)),
+        correlation=wide.correlation,
+        at_bound=tuple(at_bound),
+        residuals=found.residuals,
+        trouble=_trouble(found.met, wide, problem.parameters),
     )
 
 
-class Found(NamedTuple):
-    """The best of a model's minima: θ, its loss, whether the solver met its tolerance, and how many starts ended there."""
-
-    theta: np.ndarray
-    loss: float
-    met: bool
-    agreeing: int
-
-
-def _from_starts(problem: Problem, objective: Objective, samples: tuple, space: Space, starts: np.ndarray) -> Found:
-    """The model's best minimum from all starts."""
-    minima = solver.minimise(objective, samples, space, starts, [problem.weights] * len(starts))
-    each = [solver.losses(objective, theta, samples) for theta in minima.theta]
-    loss = np.array([np.average(losses, weights=problem.weights) for losses in each])
-    best = int(np.argmin(loss))
-    agreeing = int(np.sum(loss <= loss[best] + AGREE))
-    return Found(np.asarray(minima.theta[best]), float(loss[best]), bool(minima.found[best]), agreeing)
-
-
-def _log_rmse(problem: Problem, objective: Objective, samples: tuple, theta: np.ndarray) -> float:
-    """Root mean square of log(f̂/f) over the positive samples; NaN for slopes."""
-    if not problem.surface:
-        return math.nan
-    *directions, measured, noise = samples
-    residuals = np.asarray(solver.terms(objective, jnp.asarray(theta), (*directions, measured, jnp.zeros_like(noise))))
-    # The pseudo-Huber loss l = √(1 + r²) − 1 of each band, turned round: r² = l (l + 2).
-    loss = residuals[problem.samples[3] > 0] ** 2 * len(residuals) / 2
-    return float(np.sqrt(np.mean(loss * (loss + 2))))
-
-
-def _trouble(found: bool, wide: Spread) -> str:
-    if not wide.point:
-        return "some parameters are not identified: the minimum is a valley"
+def _trouble(found: bool, wide: Spread, names: tuple[str, ...]) -> str:
+    if wide.valley.any():
+        together = ", ".join(np.array(names)[wide.valley > IN_VALLEY * wide.valley.max()])
+        return f"not identified: the loss does not change along a line in {together}"
     if not wide.newton <= SETTLED:
         return f"not converged: the next Newton step is {wide.newton:.2g} standard errors long"
     return "" if found else "not converged: the solver used up its steps"

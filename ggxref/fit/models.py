@@ -98,19 +98,27 @@ def reflectance(cosine: Array, entries: tuple[Array, ...], kind: str) -> Array:
     return fresnel.conductor(cosine, jnp.exp(entries[0]), jnp.exp(entries[1]))
 
 
+def diffuse(entry: Array) -> Array:
+    """ρ/π of one band from θ's entry for it."""
+    return jnp.exp(entry) / math.pi
+
+
+def specular(theta: Array, wi: Array, wo: Array, wm: Array, surface: Surface) -> Array:
+    """D G2 / (4 cos cos): the specular BRDF [1/sr] of F = 1, which the shape's six entries of θ determine."""
+    D = slope_density(theta, slopes.from_normal(wm), surface.tail) / wm[2] ** 4
+    return bsdf.brdf(wi, wo, D, g2(theta, wi, wo, wm, surface), jnp.ones_like(D))
+
+
 def brdf(theta: Array, wi: Array, wo: Array, wm: Array, surface: Surface) -> Array:
     """The BRDF per band [1/sr], unit directions (3,) each: D G2 F / (4 cos cos) + ρ/π.
 
     `wm` is the half vector: it depends on no parameter, so that no fit need compute it, nor its derivatives, again.
     """
-    D = slope_density(theta, slopes.from_normal(wm), surface.tail) / wm[2] ** 4
-    G2 = g2(theta, wi, wo, wm, surface)
+    lobe = specular(theta, wi, wo, wm, surface)
     cosine = wi[0] * wm[0] + wi[1] * wm[1] + wi[2] * wm[2]
 
     def band(*entries):
-        *entries, diffuse = entries
-        F = reflectance(cosine, tuple(entries), surface.fresnel)
-        return bsdf.brdf(wi, wo, D, G2, F) + jnp.exp(diffuse) / math.pi
+        return lobe * reflectance(cosine, entries[:-1], surface.fresnel) + diffuse(entries[-1])
 
     return jax.vmap(band)(*theta[len(SHAPE) :].reshape(len(FRESNEL[surface.fresnel]) + 1, -1))
 

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.special
 
 from ggxref.errors import InputError
 
@@ -131,6 +132,32 @@ def to_user(name: str, entry: float) -> float:
         return float(np.exp(entry)) + (1.5 if kind == "gamma" else 0.0) if kind in ALLOWED else entry
 
 
+BOUNDS = {
+    "alpha": (math.log(1e-5), math.log(50.0)),
+    "gamma": (math.log(1e-4), math.log(28.5)),
+    "f0": (-9.0, 9.0),
+    "eta": (math.log(1e-4), math.log(1e4)),
+    "k": (math.log(1e-4), math.log(1e4)),
+    "diffuse": (math.log(1e-6), math.inf),
+}
+"""Entries of θ beyond which a parameter is 0, 1 or infinite for any data; γ above 30 is Beckmann's tail."""
+
+
+def at_bounds(space: Space, theta: np.ndarray, parameters: tuple[str, ...]) -> list[str]:
+    """The free parameters that ran to their bounds, where the data holds them and a standard error has no meaning."""
+    free = [(name, entry) for name, entry, moved in zip(parameters, theta, space.moved, strict=True) if moved]
+    ends = {name: BOUNDS.get(_kind(name), (-math.inf, math.inf)) for name, _ in free}
+    return [name for name, entry in free if not ends[name][0] < entry < ends[name][1]]
+
+
+def without(space: Space, names: list[str], parameters: tuple[str, ...]) -> Space:
+    """The space with the directions of these parameters left out."""
+    rows = [parameters.index(name) for name in names]
+    basis = space.basis.copy()
+    basis[:, space.basis[rows].any(axis=0)] = 0
+    return Space(space.held, basis)
+
+
 def space(groups: Groups, parameters: tuple[str, ...], fixed: Mapping[str, float], scale: float) -> Space:
     """The space of a model of these groups, with the entries `fixed` (θ's values) held.
 
@@ -193,3 +220,22 @@ def report(
     every = (*parameters, *DERIVED)
     values = everything(theta).tolist()
     return dict(zip(every, values, strict=True)), dict(zip(every, errors.tolist(), strict=True))
+
+
+SHARE = 0.95
+
+
+def intervals(
+    theta: np.ndarray, covariance: np.ndarray, parameters: tuple[str, ...], blocks: int
+) -> dict[str, tuple[float, float]]:
+    """Confidence intervals by name, from Student's t over the blocks: symmetric in θ, so that no end is out of range."""
+    quantile = scipy.special.stdtrit(max(blocks - 1, 1), (1 + SHARE) / 2)
+    reach = quantile * np.sqrt(np.diag(covariance))
+    found = {
+        name: (to_user(name, entry - width), to_user(name, entry + width))
+        for name, entry, width in zip(parameters, theta, reach, strict=True)
+    }
+    values, errors = report(theta, covariance, parameters)
+    return found | {
+        name: (values[name] - quantile * errors[name], values[name] + quantile * errors[name]) for name in DERIVED
+    }

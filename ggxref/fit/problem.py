@@ -1,7 +1,7 @@
 """From a measurement to what the solver takes: samples, weights, starts, and how the samples hang together."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,7 +9,6 @@ from ggxref.errors import InputError
 from ggxref.fit import objectives, parameters
 from ggxref.fit.data import Heights, Reflectance
 from ggxref.fit.models import Surface
-from ggxref.fit.objectives import Objective
 from ggxref.fit.parameters import Groups
 from ggxref.fit.slopes import TILES, Slopes, from_heights
 
@@ -24,7 +23,7 @@ IN_PLANE = 1e-6
 
 @dataclass(frozen=True)
 class Problem:
-    """`samples`: arrays (..., n), the objective's. `block`, `fold`: (n,) integers from 0.
+    """`samples`: arrays (..., n): wi, wo, their half vector, f per band and the noise ε; or slopes. `block`, `fold`: (n,) integers from 0.
 
     - `surface`: the reflectance model's fixed parts; None for slopes. `shapes`: those that this data can tell apart.
     - `parameters`: θ's names. `starts`: θ, (starts, p). `scale`: the typical slope.
@@ -44,10 +43,6 @@ class Problem:
     @property
     def size(self) -> int:
         return len(self.weights)
-
-    def objective(self, tail: str) -> Objective:
-        """What to minimise, with the formula of this tail."""
-        return objectives.reflectance(replace(self.surface, tail=tail)) if self.surface else objectives.slopes(tail)
 
 
 def from_reflectance(data: Reflectance, surface: Surface, *, min_cosine: float, most: int) -> Problem:

@@ -5,43 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ggxref.fit import solver
-from ggxref.fit.objectives import Objective
-from ggxref.fit.parameters import Space
 from ggxref.fit.problem import Problem
-from ggxref.fit.uncertainty import Curvature
-
-REFITTED = 2048
-"""Samples up to which the folds are fitted again; for more, one Newton step is as good and a hundred times cheaper."""
-
-
-def held_out(
-    problem: Problem, objective: Objective, samples: tuple, space: Space, theta: np.ndarray, at: Curvature
-) -> np.ndarray:
-    """(folds,): the mean loss on each fold at the minimum of the other folds."""
-    inside = [problem.weights * (problem.fold == fold) for fold in range(int(problem.fold.max()) + 1)]
-    if problem.size > REFITTED:
-        without = _one_newton_step(problem, space, theta, at)
-    else:
-        outside = [problem.weights - weights for weights in inside]
-        without = solver.minimise(objective, samples, space, np.stack([theta] * len(inside)), outside).theta
-    each = [solver.losses(objective, row, samples) for row in without]
-    return np.array([np.average(loss, weights=weights) for loss, weights in zip(each, inside, strict=True)])
-
-
-def _one_newton_step(problem: Problem, space: Space, theta: np.ndarray, at: Curvature) -> np.ndarray:
-    """(folds, p): the minimum without each fold, to first order in the fold's share.
-
-    The infinitesimal jackknife: with many samples a fold's pull on θ is a fraction of its standard error.
-    """
-    fold_of_block = np.zeros(len(at.scores), dtype=int)
-    fold_of_block[problem.block] = problem.fold
-    steps = []
-    for fold in range(int(problem.fold.max()) + 1):
-        share = problem.weights[problem.fold == fold].sum() / problem.weights.sum()
-        score = at.scores[fold_of_block == fold].sum(axis=0)
-        steps.append(np.linalg.pinv(at.hessian * (1 - share), hermitian=True) @ score)
-    return theta + np.stack(steps) @ space.basis[:, space.columns].T
 
 
 def bic(problem: Problem, loss: float, size: int) -> float:
@@ -55,13 +19,13 @@ def bic(problem: Problem, loss: float, size: int) -> float:
     return n * deviance + size * math.log(n)
 
 
-def choose(names: Sequence[str], losses: np.ndarray) -> str:
-    """The first model whose held-out loss is within one standard error of the best one's.
+def choose(names: Sequence[str], losses: np.ndarray, tolerance: float | None = None) -> str:
+    """The first model whose held-out loss is within one standard error of the best one's, or within `tolerance` of it.
 
     - `names`: from the smallest model to the largest. `losses`: (models, folds).
 
     The folds are paired: what matters is how sure the difference is, not how different the folds are.
     """
     excess = losses - losses[np.argmin(losses.mean(axis=1))]
-    error = excess.std(axis=1, ddof=1) / math.sqrt(losses.shape[1])
-    return names[int(np.argmax(excess.mean(axis=1) <= error))]
+    allowed = excess.std(axis=1, ddof=1) / math.sqrt(losses.shape[1]) if tolerance is None else tolerance
+    return names[int(np.argmax(excess.mean(axis=1) <= allowed))]

@@ -43,20 +43,28 @@ def curvature(by_block: Callable[[np.ndarray], np.ndarray], theta: np.ndarray, s
 
 
 class Spread(NamedTuple):
-    """`covariance` of θ, (p, p); `newton`: the largest Newton step left, in standard errors; `point`: is H regular?"""
+    """`covariance` and `correlation` of θ, (p, p); `newton`: the largest Newton step left, in standard errors.
+
+    `valley`: (p,), of unit length in scaled θ: the direction in which the loss is flat; zeros where the minimum is a point.
+    """
 
     covariance: np.ndarray
     newton: float
-    point: bool
+    valley: np.ndarray
+
+    @property
+    def correlation(self) -> np.ndarray:
+        error = np.sqrt(np.diag(self.covariance))
+        return self.covariance / np.outer(*[np.where(error > 0, error, 1.0)] * 2)
 
 
 def spread(at: Curvature, space: Space) -> Spread:
     """The sandwich of one model; rows and columns of held parameters are 0."""
     if not space.size:
-        return Spread(np.zeros_like(space.basis), 0.0, True)
+        return Spread(np.zeros_like(space.basis), 0.0, np.zeros(len(space.basis)))
     unit = np.sqrt(np.abs(np.diag(at.hessian)))
     units = np.outer(*[np.where(unit > 0, unit, 1.0)] * 2)
-    eigenvalues = np.linalg.eigvalsh(at.hessian / units)
+    eigenvalues, vectors = np.linalg.eigh(at.hessian / units)
     inverse = np.linalg.pinv(at.hessian / units, rcond=SINGULAR, hermitian=True) / units
     groups = np.count_nonzero(at.scores.any(axis=1))
     # The gradient at the minimum is 0, so that one block's score is minus the others': hence groups - 1.
@@ -65,5 +73,6 @@ def spread(at: Curvature, space: Space) -> Spread:
     errors = np.sqrt(np.diag(covariance))
     step = np.abs(inverse @ at.scores.sum(axis=0)) / np.where(errors > 0, errors, 1.0)
     columns = space.basis[:, space.columns]
-    point = bool(eigenvalues[0] > SINGULAR * eigenvalues[-1])
-    return Spread(columns @ covariance @ columns.T, float(step.max()), point)
+    flat = eigenvalues[0] <= SINGULAR * eigenvalues[-1]
+    valley = np.abs(columns) @ np.abs(vectors[:, 0]) if flat else np.zeros(len(columns))
+    return Spread(columns @ covariance @ columns.T, float(step.max()), valley)

@@ -1,0 +1,169 @@
+"""Reflectance problems of one kind solved side by side: from many starts on few samples, then on all, then without each fold."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ggxref.fit import levenberg, parameters, rows
+from ggxref.fit.found import Found
+from ggxref.fit.parameters import Space
+from ggxref.fit.problem import Problem
+from ggxref.fit.rows import Each, Lanes, Rows
+from ggxref.fit.uncertainty import Curvature
+
+FEW = 512
+"""Samples, evenly through the file, on which the starts run; what they find is a start for all samples."""
+AGREE = 1e-3
+"""Of the loss on those few: starts that end within this have found the same minimum."""
+SETTLED, NEARLY = 1e-3, 0.1
+"""Standard errors that may be left to the minimum, of a fit and of what only leads to one."""
+MOST_STEPS, FIRST_STEPS, FOLD_STEPS = 100, 40, 8
+REFITTED = 8192
+"""Samples up to which each fold's fit is carried on after its first Newton step; with more, that step is as good."""
+
+
+class Bank(NamedTuple):
+    """The rows of several problems, all samples' and the few's, and which of them are each problem's."""
+
+    problems: list[Problem]
+    all: Rows
+    of: list[np.ndarray]
+    few: Rows
+    few_of: list[np.ndarray]
+
+
+def bank(problems: list[Problem]) -> Bank:
+    whole = [rows.cut(problem) for problem in problems]
+    few = [rows.cut(p, np.arange(min(FEW, p.size)) * p.size // min(FEW, p.size)) for p in problems]
+    return Bank(problems, rows.join(whole), _numbers(whole), rows.join(few), _numbers(few))
+
+
+def _numbers(several: list[Rows]) -> list[np.ndarray]:
+    ends = np.cumsum([len(each.weights) for each in several])
+    return [np.arange(end - len(each.weights), end) for end, each in zip(ends, several, strict=True)]
+
+
+def solve(bank: Bank, tail: str, spaces: list[Space], starts: list[np.ndarray]) -> list[Found]:
+    """The minimum of each problem in its space, from its starts θ, (starts, p), the last of which is nearly one already."""
+    surface = bank.problems[0].surface
+    assert surface is not None
+    surface = replace(surface, tail=tail)
+    begun, agreeing = _from_starts(bank, surface, spaces, starts)
+    bases = np.stack([space.basis for space in spaces])
+    lanes = _lanes(surface, bank.all, bank.of)
+    minima = levenberg.minimise(lanes.terms, begun, bases, lanes.samples, settled=SETTLED, most=MOST_STEPS)
+    names = [problem.parameters for problem in bank.problems]
+    pinned = [parameters.at_bounds(*each) for each in zip(spaces, minima.theta, names, strict=True)]
+    spaces = [parameters.without(*each) for each in zip(spaces, pinned, names, strict=True)]
+    at = [_curvature(bank, surface, k, minima.theta[k], spaces[k]) for k in range(len(spaces))]
+    held_out = _held_out(bank, surface, minima.theta, spaces, [each[1] for each in at])
+    return [
+        Found(
+            theta=minima.theta[k],
+            loss=float(minima.loss[k]),
+            met=bool(minima.met[k]),
+            space=spaces[k],
+            agreeing=(int(agreeing[k]), len(starts[k])),
+            at=at[k][0],
+            held_out=held_out[k],
+            residuals=_residuals(bank, surface, k, minima.theta[k]),
+        )
+        for k in range(len(spaces))
+    ]
+
+
+def _lanes(surface, rows: Rows, which: list[np.ndarray]) -> Lanes:
+    return Lanes(surface, rows, which, [rows.weights[numbers] for numbers in which])
+
+
+def _from_starts(bank: Bank, surface, spaces: list[Space], starts: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Where to begin with all samples, (problems, p), and how many starts ended there."""
+    owner = np.repeat(np.arange(len(starts)), [len(each) for each in starts])
+    few = _lanes(surface, bank.few, [bank.few_of[k] for k in owner])
+    bases = np.stack([spaces[k].basis for k in owner])
+    inside = np.concatenate(
+        [[s.held + s.basis @ s.coordinates(row) for row in each] for s, each in zip(spaces, starts, strict=True)]
+    )
+    found = levenberg.minimise(few.terms, inside, bases, few.samples, settled=NEARLY, most=FIRST_STEPS)
+    best = [np.flatnonzero(owner == k)[np.argmin(found.loss[owner == k])] for k in range(len(starts))]
+    agreeing = np.array(
+        [np.sum(found.loss[owner == k] <= found.loss[best[k]] * (1 + AGREE)) for k in range(len(starts))]
+    )
+    # A smaller model's minimum, the last start, may be lower on all samples than what the few led to.
+    last = np.cumsum([len(each) for each in starts]) - 1
+    lanes, everyone = _lanes(surface, bank.all, bank.of), np.arange(len(starts))
+    ends, smaller = found.theta[best], inside[last]
+    lower = lanes.terms(smaller, everyone).loss < lanes.terms(ends, everyone).loss
+    return np.where(lower[:, None], smaller, ends), agreeing
+
+
+class _Folds(NamedTuple):
+    """Summed gradient (folds, p) and bread (folds, p, p) of each fold."""
+
+    gradient: np.ndarray
+    bread: np.ndarray
+
+
+def _curvature(bank: Bank, surface, k: int, theta: np.ndarray, space: Space) -> tuple[Curvature, _Folds]:
+    problem, which = bank.problems[k], bank.of[k]
+    found = _join(rows.each(surface, np.tile(theta, (len(which), 1)), bank.all, which, bank.all.weights[which]))
+    index = bank.all.index[which]
+    columns = space.basis[:, space.columns]
+    scores = np.stack([np.bincount(problem.block[index[index >= 0]], column) for column in
+                       (columns.T @ found.scores.swapaxes(0, 1)[:, index >= 0])], axis=1) if space.size else \
+             np.zeros((problem.block.max() + 1, 0))  # fmt: skip
+    fold = bank.all.fold[which]
+    sums = [
+        np.stack([part[fold == f].sum(axis=0) for f in range(fold.max() + 1)])
+        for part in (found.scores.sum(axis=-1), found.bread)
+    ]
+    return Curvature(columns.T @ found.bread.sum(axis=0) @ columns, scores), _Folds(*sums)
+
+
+def _join(pieces: list[Each]) -> Each:
+    return Each(*(np.concatenate(parts) for parts in zip(*pieces, strict=True)))
+
+
+def _held_out(bank: Bank, surface, theta: np.ndarray, spaces: list[Space], folds: list[_Folds]) -> list[np.ndarray]:
+    """Of each problem the mean loss on each fold, at the minimum of the other folds."""
+    begun = [_without(theta[k], spaces[k], folds[k]) for k in range(len(spaces))]
+    owner = np.repeat(np.arange(len(begun)), [len(each) for each in begun])
+    number = np.concatenate([np.arange(len(each)) for each in begun])
+    inside = [bank.of[k][bank.all.fold[bank.of[k]] == f] for k, f in zip(owner, number, strict=True)]
+    outside = [bank.of[k][bank.all.fold[bank.of[k]] != f] for k, f in zip(owner, number, strict=True)]
+    there = np.concatenate(begun)
+    again = np.flatnonzero([bank.problems[k].size <= REFITTED for k in owner])
+    if len(again):
+        lanes = _lanes(surface, bank.all, [outside[k] for k in again])
+        bases = np.stack([spaces[owner[k]].basis for k in again])
+        there[again] = levenberg.minimise(
+            lanes.terms, there[again], bases, lanes.samples, settled=NEARLY, most=FOLD_STEPS
+        ).theta
+    loss = _lanes(surface, bank.all, inside).terms(there, np.arange(len(there))).loss
+    return [loss[owner == k] for k in range(len(spaces))]
+
+
+def _without(theta: np.ndarray, space: Space, folds: _Folds) -> np.ndarray:
+    """(folds, p): the minimum without each fold, by one Newton step from the minimum with it."""
+    columns = space.basis[:, space.columns]
+    steps = [
+        np.linalg.pinv(columns.T @ (folds.bread.sum(axis=0) - bread) @ columns, rcond=1e-10, hermitian=True)
+        @ (columns.T @ gradient)
+        for gradient, bread in zip(folds.gradient, folds.bread, strict=True)
+    ]
+    return theta + np.clip(np.stack(steps), -levenberg.LONGEST, levenberg.LONGEST) @ columns.T
+
+
+def _residuals(bank: Bank, surface, k: int, theta: np.ndarray) -> np.ndarray:
+    """(n, bands): log(f̂/f), with the sign lost; NaN where f is not positive."""
+    problem, which = bank.problems[k], bank.of[k]
+    *directions, measured, noise = bank.all.samples
+    plain = bank.all._replace(samples=(*directions, np.where(measured > 0, measured, 1.0), np.zeros_like(noise)))
+    found = _join(rows.each(surface, np.tile(theta, (len(which), 1)), plain, which, bank.all.weights[which]))
+    index = bank.all.index[which]
+    residuals = np.empty((problem.size, measured.shape[1]))
+    # The pseudo-Huber loss l = √(1 + r²) − 1, turned round: r² = l (l + 2).
+    loss = found.losses.swapaxes(1, 2)[index >= 0]
+    residuals[index[index >= 0]] = np.sqrt(loss * (loss + 2))
+    return np.where(problem.samples[3].T > 0, residuals, np.nan)
