@@ -35,7 +35,7 @@ def btdf(wi: Vec3, wo: Vec3, n_i: Real, n_o: Real, D: Real, G2: Real, F: Real) -
     wm = geometry.half_refraction(wi, wo, n_i, n_o)
     spread = jacobian.refraction(wi, wo, wm, n_i, n_o)
     straight = jnp.isinf(spread)  # no half vector: 0 times infinity
-    transmitted = jnp.abs(stable.dot(wi, wm)) * jnp.where(straight, 1, spread) * (1 - F) * G2 * D
+    transmitted = jnp.abs(stable.cosine(wi, wm)) * jnp.where(straight, 1, spread) * (1 - F) * G2 * D
     transmitted = jnp.where(straight, jnp.inf, transmitted)
     return _over(transmitted, jnp.abs(wi[2]) * jnp.abs(wo[2]))
 
@@ -47,7 +47,7 @@ def weight_normals(wi: Vec3, wm: Vec3, G2: Real) -> Scalar:
 
     heitz2014 §2.2, algorithm 1 (table 2 leaves out |ω_i·n|).
     """
-    return _over(jnp.abs(stable.dot(wi, wm)) * G2, jnp.abs(wi[2]) * jnp.abs(wm[2]))
+    return _over(jnp.abs(stable.cosine(wi, wm)) * G2, jnp.abs(wi[2]) * jnp.abs(wm[2]))
 
 
 def weight_visible(g1_i: Real, g2: Real, F: Real) -> Scalar:

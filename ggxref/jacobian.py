@@ -14,7 +14,7 @@ def reflection(wo: Vec3, wm: Vec3) -> Scalar:
 
     heitz2014 §2.2, dupuy2023 (8), tokuyoshi2024.
     """
-    return 1 / (4 * jnp.abs(stable.dot(wo, wm)))
+    return 1 / (4 * jnp.abs(stable.cosine(wo, wm)))
 
 
 def refraction(wi: Vec3, wo: Vec3, wm: Vec3, n_i: Real, n_o: Real) -> Scalar:
@@ -24,7 +24,7 @@ def refraction(wi: Vec3, wo: Vec3, wm: Vec3, n_i: Real, n_o: Real) -> Scalar:
 
     heitz2014 §2.2 (printed as ∂ω_ht/∂ω_i; the variable is the generated direction ω_o).
     """
-    i, o = stable.dot(wi, wm), stable.dot(wo, wm)
+    i, o = stable.cosine(wi, wm), stable.cosine(wo, wm)
     # A plain sum may be contracted to an FMA, which is not 0 where the two terms are opposite.
     n = jnp.asarray(n_i, wi.dtype), jnp.asarray(n_o, wi.dtype)
     path = stable.dot(n, (i, o))

@@ -31,7 +31,7 @@ def lambda_beckmann(w: Vec3, alpha: Vec2) -> Scalar:
 
 def _front(w, wm):
     """χ⁺ of eq. (3) of heitz2014: is this side of the microfacet turned to `w`, seen from w's side of the surface?"""
-    cosine = stable.dot(w, wm)
+    cosine = stable.cosine(w, wm)
     return ((cosine > 0) & (w[2] > 0)) | ((cosine < 0) & (w[2] < 0))  # a product could underflow
 
 
@@ -60,7 +60,7 @@ def g1_v_cavity(w: Vec3, wm: Vec3) -> Scalar:
 
     heitz2014 (3).
     """
-    cosine = jnp.abs(stable.dot(w, wm))
+    cosine = jnp.abs(stable.cosine(w, wm))
     masked = 2 * jnp.abs(wm[2] * w[2])
     # Compare before dividing: the quotient overflows where the microfacet is seen edge-on.
     whole = masked >= cosine

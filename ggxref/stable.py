@@ -67,36 +67,48 @@ def _collected(products):
     return total, errors
 
 
-@jax.custom_jvp
-def _dot(a, b):
+@functools.partial(jax.custom_jvp, nondiff_argnums=(2,))
+def _dot(a, b, fold):
     total, errors = _collected([_two_product(x, y) for x, y in zip(a, b, strict=True)])
-    # The products cancel down to their own errors where a is nearly perpendicular to b: these are summed the same way.
+    if fold == 2:
+        return total + sum(errors)
     rest = 0
-    for error in errors:
+    for error in errors:  # these are summed the same way
         total, lost = _two_sum(total, error)
         rest = rest + lost
     return total + rest
 
 
 @_dot.defjvp
-def _dot_jvp(primals, tangents):
+def _dot_jvp(fold, primals, tangents):
     (a, b), (da, db) = primals, tangents
     change, *terms = (x * dy + dx * y for x, dx, y, dy in zip(a, da, b, db, strict=True))
     for term in terms:
         change = change + term
-    return _dot(a, b), change
+    return _dot(a, b, fold), change
 
 
 @widened
 def dot(a: Components, b: Components) -> Array:
-    r"""$a \cdot b$ in three times the working precision, rounded once: from two (3,), or from two tuples of equally many
+    r"""$a \cdot b$ in twice the working precision, rounded once: from two (3,), or from two tuples of equally many
     components, whose shapes broadcast.
 
-    The plain sum has an unbounded relative error where the vectors are nearly perpendicular, and there stand the
-    factor $\omega_i \cdot \omega_m$ of every visible density and the decision which side of a microfacet is seen.
+    Ogita, Rump & Oishi 2005, algorithm 5.3.
+    """
+    return _dot(a, b, 2)
+
+
+@widened
+def cosine(w: Vec3, wm: Vec3) -> Scalar:
+    r"""$\omega \cdot \omega_m$ in three times the working precision, rounded once.
+
+    The plain sum has an unbounded relative error where the vectors are nearly perpendicular, and there the products
+    cancel down to their own errors, which `dot` adds with a rounding each. On this stand the factor
+    $\omega_i \cdot \omega_m$ of every visible density and the decision which side of a microfacet is seen.
+
     Ogita, Rump & Oishi 2005, algorithm 5.10 with K = 3.
     """
-    return _dot(a, b)
+    return _dot(w, wm, 3)
 
 
 def cross(a: Vec3, b: Vec3) -> Vec3:

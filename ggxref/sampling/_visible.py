@@ -11,7 +11,7 @@ from ggxref.ellipsoid import sigma as sigma_ellipsoid
 
 
 def _density(wm, wi, D, sigma):
-    cosine = stable.dot(wi, wm)
+    cosine = stable.cosine(wi, wm)
     seen = (cosine > 0) & (sigma > 0)
     return jnp.where(seen, cosine * D / jnp.where(seen, sigma, 1), 0)
 

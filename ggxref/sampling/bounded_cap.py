@@ -50,7 +50,7 @@ def pdf(wm: Vec3, wi: Vec3, alpha: Vec2) -> Scalar:
 
     tokuyoshi2024.
     """
-    cosine = stable.dot(wi, wm)
+    cosine = stable.cosine(wi, wm)
     cut = _bound_terms(wi, alpha)[1]
     # o'_z + i'_z = 2 (ωi·ωm) z_m / (norm q) has to reach (1 − k) z_i / norm.
     q = (wm[0] / alpha[0]) ** 2 + (wm[1] / alpha[1]) ** 2 + wm[2] ** 2

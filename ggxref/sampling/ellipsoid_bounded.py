@@ -74,7 +74,7 @@ def pdf(wm: Vec3, wi: Vec3, A: Mat3) -> Scalar:
     """
     A = canonical(A)
     i = to_sphere(wi, A)
-    cosine = stable.dot(wi, wm)
+    cosine = stable.cosine(wi, wm)
     cof, det = cofactor(A)
     x, y, z = times(cof, *wm)
     q = (x / det) ** 2 + (y / det) ** 2 + (z / det) ** 2

@@ -146,7 +146,7 @@ def pdf(wm: Vec3, wi: Vec3, alpha: Vec2, table: Table) -> Scalar:
     theta = _inclination(i)
     last = table.sigma.shape[0] - 1
     sigma = i.norm * jnp.interp(theta * last, jnp.arange(last + 1), table.sigma).astype(wm.dtype)
-    cosine = stable.dot(wi, wm)
+    cosine = stable.cosine(wi, wm)
     seen = (cosine > 0) & (wm[2] > 0) & (wi[2] > 0)
     z = jnp.where(seen, wm[2], 1)
     value = table.density(jnp.stack([-wm[0] / (z * alpha[0]), -wm[1] / (z * alpha[1])]))

@@ -14,8 +14,8 @@ _NDF = {"ggx": ndf.ggx, "beckmann": ndf.beckmann}
 
 def _share(wm, wi):
     """Of the area that the two walls of the cavity show to `wi`, the share of the one with normal `wm`."""
-    a = jnp.maximum(stable.dot(wi, wm), 0)
-    b = jnp.maximum(stable.dot(wi, jnp.stack([-wm[0], -wm[1], wm[2]])), 0)
+    a = jnp.maximum(stable.cosine(wi, wm), 0)
+    b = jnp.maximum(stable.cosine(wi, jnp.stack([-wm[0], -wm[1], wm[2]])), 0)
     return a / jnp.where(a + b > 0, a + b, 1)
 
 

@@ -154,10 +154,10 @@ def _diffuse_share(row: Rows) -> Scalar:
 
 def _at(kind: Kind, row: Rows, wi: Vec3, wo: Vec3, wm: Vec3) -> tuple[Scalar, Scalar]:
     """BSDF × |cos| and pdf of the micronormal's part, both 0 on a side that it does not reach."""
-    D, F = getattr(ndf, kind.ndf)(wm, _shape(kind, row)), _fresnel(kind, row, stable.dot(wi, wm))
+    D, F = getattr(ndf, kind.ndf)(wm, _shape(kind, row)), _fresnel(kind, row, stable.cosine(wi, wm))
     g2, density = _g2(kind, row, wi, wo, wm), _density(kind, row, wm, wi)
-    mirrored = (wo[2] > 0) & (stable.dot(wi, wm) > 0)
-    i_m, o_m = stable.dot(wi, wm), stable.dot(wo, wm)
+    mirrored = (wo[2] > 0) & (stable.cosine(wi, wm) > 0)
+    i_m, o_m = stable.cosine(wi, wm), stable.cosine(wo, wm)
     value = jnp.where(mirrored, bsdf.brdf(wi, wo, D, g2, F), 0)
     pdf = jnp.where(mirrored & (o_m > 0), density * jacobian.reflection(wo, wm), 0)
     if kind.surface == "dielectric":
@@ -218,7 +218,7 @@ def sample(kind: Kind, row: Rows, u: Array, wi: Vec3) -> Scatter:
     wm = _draw(kind, row, u[:3], wi)
     wo = geometry.reflect(wi, wm)
     if kind.surface == "dielectric":
-        F = _fresnel(kind, row, stable.dot(wi, wm))
+        F = _fresnel(kind, row, stable.cosine(wi, wm))
         wo = jnp.where(u[3] < F, wo, geometry.refract(wi, wm, 1 / row.eta))
     if kind.diffuse:
         wo = jnp.where(u[3] < _diffuse_share(row), cosine_lobe(u[:2]), wo)
