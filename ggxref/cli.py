@@ -1,5 +1,6 @@
 """The command line: six verbs, and the only file that sees every part of the package."""
 
+import shlex
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -123,13 +124,14 @@ def vectors(
         int | None, typer.Option(help="Tests in all; without it, each corner of each function once.")
     ] = None,
     seed: Annotated[int, typer.Option(help="Another seed draws other inputs.")] = 1,
+    form: Annotated[str, typer.Option("--format", help="json, or text: hex words only, for scanf.")] = "json",
     jobs: Annotated[int, typer.Option(help="Worker processes; they do not change the bytes.", min=1)] = 1,
     json: Annotated[Path | None, typer.Option(metavar="PATH", help="Write the manifest here too.")] = None,
 ) -> None:
     """Write golden test vectors: inputs as bits, results proven correctly rounded, from the oracle alone."""
     from ggxref.golden import generate
 
-    order = generate.order(functions, dtypes, count, seed)
+    order = generate.order(functions, dtypes, count, seed, form)
     if directory.exists() and not directory.is_dir():
         raise InputError(f"{directory}: is a file; vectors are written into a directory")
     with _progress("tests", sum(order.quotas().values())) as advance:
@@ -246,6 +248,58 @@ def choose(
         pictures.mkdir(exist_ok=True)
         for name, each in result.pictures.items():
             image.write(pictures / name, each.mean)
+
+
+@app.command(epilog="Example: ggxref grade --command ./renderer_answers --functions ndf,masking --dtypes f32")
+def grade(
+    directory: Annotated[
+        Path | None, typer.Argument(metavar="[DIR]", help="Vectors; without it, those shipped.")
+    ] = None,
+    python: Annotated[str, typer.Option(metavar="MODULE", help="A Python module with the public names.")] = "",
+    mapping: Annotated[
+        Path | None, typer.Option("--map", metavar="FILE", help='JSON for other names: {"ndf.ggx": "module:function"}.')
+    ] = None,
+    jax: Annotated[bool, typer.Option("--jax", help="The Python functions are JAX functions: compile them.")] = False,
+    command: Annotated[str, typer.Option(metavar="CMD", help="A program: questions on stdin, answers on stdout.")] = "",
+    answers: Annotated[Path | None, typer.Option(metavar="FILE", help="Answers written before.")] = None,
+    functions: Annotated[str, typer.Option(help="Names or modules, separated by commas.")] = "all",
+    dtypes: Annotated[str, typer.Option(help="Of f64, f32, bf16, f16, separated by commas.")] = "all",
+    test: Annotated[int | None, typer.Option(metavar="ID", help="Only this test of each function and dtype.")] = None,
+    timeout: Annotated[float, typer.Option(metavar="SECONDS", help="Stop the program after so long.", min=0.1)] = 60.0,
+    strict: Annotated[bool, typer.Option("--strict", help="Subnormals must not be flushed to zero.")] = False,
+    json: Annotated[Path | None, typer.Option(metavar="PATH", help="Write the result for machines here.")] = None,
+    html: Annotated[Path | None, typer.Option(metavar="PATH", help="Write a page with a heat map here.")] = None,
+) -> None:
+    """Run somebody's implementation over golden vectors: what fails, by how much, which mistake it looks like."""
+    from ggxref.golden import callables, generate, reading, report
+    from ggxref.golden import grade as grading
+
+    if sum(map(bool, (python or mapping, command, answers))) != 1:
+        raise InputError("wanted one of --python (or --map), --command and --answers")
+    order = generate.order(functions, dtypes, None, 1)
+    tests = grading.selected(reading.read(directory or reading.SHIPPED), order, test)
+    if command:
+        result = grading.of_program(command, tests, timeout, strict)
+    elif answers:
+        result = grading.of_file(answers, tests, strict)
+    else:
+        implementation = callables.implementation(python, mapping, jax)
+        with _progress("tests", len(tests)) as advance:
+            result = grading.of_python(implementation, tests, strict, advance)
+    options = {"--python": python, "--map": mapping, "--command": command, "--answers": answers}
+    given = [part for name, value in options.items() if value for part in (name, str(value))]
+    again = shlex.join(
+        ["ggxref", "grade", *([str(directory)] if directory else []), *given, *(["--jax"] if jax else [])]
+    )
+    report.show(result, again)
+    for path, content in (
+        (json, lambda: dumps(report.as_json(result), indent=1)),
+        (html, lambda: report.page(result, again)),
+    ):
+        if path:
+            write_atomically(path, content() + "\n")
+    if not result.passed:
+        raise typer.Exit(1)
 
 
 def _interrupted(signum: int, frame: object) -> None:

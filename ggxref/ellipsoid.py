@@ -53,6 +53,7 @@ def shape_matrix(alpha: Vec2, angles: Vec3) -> Mat3:
     return jnp.stack(rows)
 
 
+@stable.widened
 def canonical(A: Mat3) -> Mat3:
     r"""The representative of `A`'s distribution with $A n = n$: $\begin{pmatrix} C^T & 0 \\ e^T & 1 \end{pmatrix}$.
 
@@ -91,6 +92,7 @@ def from_slopes(mean: Vec2, scatter: Mat2) -> Mat3:
     return jnp.stack([jnp.stack([c00, c10, zero]), jnp.stack([zero, c11, zero]), jnp.stack([-mean[0], -mean[1], one])])
 
 
+@stable.widened
 def to_slopes(A: Mat3) -> tuple[Vec2, Mat2]:
     """The `(mean, scatter)` of `from_slopes` for any `A`: (2,) and (2, 2)."""
     (c00, c10, _), (_, c11, _), (ex, ey, _) = canonical(A)
@@ -104,11 +106,13 @@ def sggx(A: Mat3) -> Mat3:
     return jnp.stack([jnp.stack([a[0] * b[0] + a[1] * b[1] + a[2] * b[2] for b in columns]) for a in columns])
 
 
+@stable.widened
 def size(A: Mat3) -> Scalar:
     r"""The $C_e$ that gives unit projected area along n: $\sqrt{|\det A| / (\pi \|A n\|)}$. walter2014 (29)."""
     return jnp.sqrt(jnp.abs(cofactor(A)[1]) / (math.pi * length(*A[:, 2])))
 
 
+@stable.widened
 def gaussian_curvature(wm: Vec3, A: Mat3, size: Real) -> Scalar:
     r"""Gaussian curvature where the normal is `wm`: $K = |A|^2 \|A^{-T}\omega_m\|^4 / C_e^2$.
 
@@ -122,6 +126,7 @@ def gaussian_curvature(wm: Vec3, A: Mat3, size: Real) -> Scalar:
     return ((x * x + y * y + z * z) / det / size) ** 2
 
 
+@stable.widened
 def projected_area(w: Vec3, A: Mat3, size: Real) -> Scalar:
     r"""Area of the ellipsoid's shadow along `w`: $\pi C_e^2 \|A\omega\| / |A|$.
 
@@ -148,6 +153,7 @@ def lune_sum(u: Vec3, v: Vec3, A: Mat3) -> Scalar:
     return jnp.where(obtuse, square / jnp.where(obtuse, product - cosine, 1), product + cosine)
 
 
+@stable.widened
 def lune_area(u: Vec3, v: Vec3, A: Mat3, size: Real) -> Scalar:
     r"""Area projected along `u` of the part with $m\cdot u > 0$ and $m\cdot v > 0$:
     $\pi C_e^2 (\|Au\|\|Av\| + Au\cdot Av) / (2 |A| \|Av\|)$.
@@ -168,6 +174,7 @@ def mean_normal(A: Mat3) -> Vec3:
     return jnp.stack(stable.unit(*times(A.T, *A[:, 2])))
 
 
+@stable.widened
 def sigma(w: Vec3, A: Mat3) -> Scalar:
     r"""$\sigma = A_\ell^\perp(\omega, n)/A_e^\perp(n) = (\|A\omega\|\|An\| + A\omega\cdot An)/(2\|An\|^2)$; `w` anywhere.
 

@@ -14,6 +14,7 @@ from ggxref.ellipsoid import sigma as sigma_ellipsoid
 from ggxref.slopes import gaussian_area, sigma_beckmann, sigma_ggx
 
 
+@stable.widened
 def lambda_ggx(w: Vec3, alpha: Vec2) -> Scalar:
     r"""$\Lambda = (-1 + \sqrt{1 + (\alpha_x^2 x^2 + \alpha_y^2 y^2)/z^2})/2$; infinite at the horizon. tokuyoshi2024."""
     square = (alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2
@@ -21,6 +22,7 @@ def lambda_ggx(w: Vec3, alpha: Vec2) -> Scalar:
     return square / (2 * z * (z + stable.sqrt(square + z * z)))  # -1 + sqrt(1 + a²) cancels for small a
 
 
+@stable.widened
 def lambda_beckmann(w: Vec3, alpha: Vec2) -> Scalar:
     r"""$\Lambda = (\mathrm{erf}\,a - 1)/2 + e^{-a^2}/(2a\sqrt\pi)$, $a = |z|/\|(\alpha_x x, \alpha_y y)\|$; infinite at the horizon.
 
@@ -40,6 +42,7 @@ def _up(w):
     return jnp.where(w[2] < 0, -w, w)
 
 
+@stable.widened
 def g1_ggx(w: Vec3, wm: Vec3, alpha: Vec2) -> Scalar:
     r"""Smith's G1 for GGX: $2|z|/(|z| + \|(\alpha_x x, \alpha_y y, z)\|)$ on front faces, else 0.
 
@@ -48,6 +51,7 @@ def g1_ggx(w: Vec3, wm: Vec3, alpha: Vec2) -> Scalar:
     return jnp.where(_front(w, wm), jnp.abs(w[2]) / sigma_ggx(_up(w), alpha), 0)
 
 
+@stable.widened
 def g1_beckmann(w: Vec3, wm: Vec3, alpha: Vec2) -> Scalar:
     r"""Smith's G1 for Beckmann: $1/(1 + \Lambda(\omega))$ on front faces, else 0. heitz2014 §2.1 (Smith 1967)."""
     sigma = sigma_beckmann(_up(w), alpha)
@@ -68,6 +72,7 @@ def g1_v_cavity(w: Vec3, wm: Vec3) -> Scalar:
     return jnp.where(_front(w, wm), g1, 0)
 
 
+@stable.widened
 def g1_ellipsoid(w: Vec3, wm: Vec3, A: Mat3) -> Scalar:
     r"""Ellipsoid G1: $\min(1, 2\|An\|^2|\omega\cdot n|/(\|A\omega\|\|An\| + A\omega\cdot An))$ on front faces, else 0.
 

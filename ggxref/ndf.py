@@ -22,6 +22,7 @@ def _stretched(wm, alpha):
     return (wm[0] / alpha[0]) ** 2 + (wm[1] / alpha[1]) ** 2
 
 
+@stable.widened
 def ggx(wm: Vec3, alpha: Vec2) -> Scalar:
     r"""Anisotropic GGX: $D = 1 / (\pi\alpha_x\alpha_y (x^2/\alpha_x^2 + y^2/\alpha_y^2 + z^2)^2)$.
 
@@ -33,6 +34,7 @@ def ggx(wm: Vec3, alpha: Vec2) -> Scalar:
     return jnp.where(wm[2] > 0, D, 0)
 
 
+@stable.widened
 def beckmann(wm: Vec3, alpha: Vec2) -> Scalar:
     r"""Anisotropic Beckmann: $D = \exp(-(x^2/\alpha_x^2 + y^2/\alpha_y^2)/z^2) / (\pi\alpha_x\alpha_y z^4)$.
 
@@ -48,6 +50,7 @@ def beckmann(wm: Vec3, alpha: Vec2) -> Scalar:
     return jnp.where(seen, D, 0)
 
 
+@stable.widened
 def student_t(wm: Vec3, alpha: Vec2, gamma: Real) -> Scalar:
     r"""Student-t slopes: $D = \frac{(\gamma-1)^\gamma}{\pi\alpha_x\alpha_y z^4 (\gamma - 1 + (x^2/\alpha_x^2 + y^2/\alpha_y^2)/z^2)^\gamma}$.
 
@@ -73,6 +76,7 @@ def student_t(wm: Vec3, alpha: Vec2, gamma: Real) -> Scalar:
     return jnp.where(above, D, 0)
 
 
+@stable.widened
 def ellipsoid(wm: Vec3, A: Mat3) -> Scalar:
     r"""Ellipsoid NDF: $D = \chi^+(\omega_m\cdot n) / (\pi\,|A|\,\|A n\|\,\|A^{-T}\omega_m\|^4)$.
 

@@ -38,12 +38,14 @@ def _stretched_square(slope, alpha):
     return (slope[0] / alpha[0]) ** 2 + (slope[1] / alpha[1]) ** 2
 
 
+@stable.widened
 def ggx(slope: Vec2, alpha: Vec2) -> Scalar:
     r"""$P^{22} = 1 / (\pi\alpha_x\alpha_y (1 + \tilde x^2/\alpha_x^2 + \tilde y^2/\alpha_y^2)^2)$. heitz2014 §5."""
     q = 1 + _stretched_square(slope, alpha)
     return 1 / (math.pi * (alpha[0] * q) * (alpha[1] * q))
 
 
+@stable.widened
 def beckmann(slope: Vec2, alpha: Vec2) -> Scalar:
     r"""$P^{22} = \exp(-\tilde x^2/\alpha_x^2 - \tilde y^2/\alpha_y^2) / (\pi\alpha_x\alpha_y)$. heitz2014 §5."""
     # Half the exponent twice: the peak 1/(π αx αy) reaches into tails where the exponential alone has underflowed.
@@ -51,6 +53,7 @@ def beckmann(slope: Vec2, alpha: Vec2) -> Scalar:
     return half * (half / (math.pi * alpha[0] * alpha[1]))
 
 
+@stable.widened
 def student_t(slope: Vec2, alpha: Vec2, gamma: Real) -> Scalar:
     r"""$P^{22} = (\gamma-1)^\gamma / (\pi\alpha_x\alpha_y (\gamma-1+\tilde x^2/\alpha_x^2+\tilde y^2/\alpha_y^2)^\gamma)$.
 
@@ -63,6 +66,7 @@ def student_t(slope: Vec2, alpha: Vec2, gamma: Real) -> Scalar:
     return half * (half / (math.pi * alpha[0] * alpha[1]))
 
 
+@stable.widened
 def ellipsoid(slope: Vec2, A: Mat3) -> Scalar:
     r"""GGX off its centre and sheared: $1 / (\pi|C| (1 + \|C^{-1}(\tilde m + e)\|^2)^2)$ for the canonical `A`.
 
@@ -76,6 +80,7 @@ def ellipsoid(slope: Vec2, A: Mat3) -> Scalar:
     return 1 / (math.pi * (c00 * q) * (c11 * q))
 
 
+@stable.widened
 def sigma_ggx(w: Vec3, alpha: Vec2) -> Scalar:
     r"""$\sigma = (z + \|(\alpha_x x, \alpha_y y, z)\|)/2$, for `w` anywhere. dupuy2023 (4) after the stretch."""
     square = (alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2
@@ -94,6 +99,7 @@ def gaussian_area(w, alpha):
     return jnp.where(square > 0, s * stable.ierfc(a) / 2, 0)
 
 
+@stable.widened
 def sigma_beckmann(w: Vec3, alpha: Vec2) -> Scalar:
     r"""$\sigma = z\,(1 + \mathrm{erf}\,a)/2 + s\,e^{-a^2}/(2\sqrt\pi)$, $a = z/s$, $s = \|(\alpha_x x, \alpha_y y)\|$; `w` anywhere.
 
@@ -109,6 +115,7 @@ def _visible(slope, wi, sigma):
     return jnp.where((factor > 0) & (sigma > 0), factor / jnp.where(sigma > 0, sigma, 1), 0)
 
 
+@stable.widened
 def visible_ggx(slope: Vec2, wi: Vec3, alpha: Vec2) -> Scalar:
     r"""Density of the slopes that `wi` sees: $\max(0, -x_i\tilde x - y_i\tilde y + z_i)\,P^{22}(\tilde m)/\sigma(\omega_i)$.
 
@@ -119,6 +126,7 @@ def visible_ggx(slope: Vec2, wi: Vec3, alpha: Vec2) -> Scalar:
     return _visible(slope, wi, sigma_ggx(wi, alpha)) * ggx(slope, alpha)
 
 
+@stable.widened
 def visible_beckmann(slope: Vec2, wi: Vec3, alpha: Vec2) -> Scalar:
     """`visible_ggx` for Beckmann slopes. heitz2014 (7)."""
     return _visible(slope, wi, sigma_beckmann(wi, alpha)) * beckmann(slope, alpha)

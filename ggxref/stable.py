@@ -47,12 +47,14 @@ def widened(function: Callable) -> Callable:
     """`function`, computed in float32 where it is given half precision: the square of 1e-4 is 0 in float16."""
 
     @functools.wraps(function)
-    def in_float32(*args, **policy):
-        dtype = jnp.result_type(*jax.tree.leaves(args))
+    def in_float32(*args, **named):
+        numbers = args, {k: x for k, x in named.items() if not isinstance(x, str)}
+        dtype = jnp.result_type(*jax.tree.leaves(numbers))
         if dtype.itemsize > 2:
-            return function(*args, **policy)
-        wide = jax.tree.map(lambda x: jnp.asarray(x, jnp.float32), args)
-        return jax.tree.map(lambda x: x.astype(dtype), function(*wide, **policy))
+            return function(*args, **named)
+        wide, wide_named = jax.tree.map(lambda x: jnp.asarray(x, jnp.float32), numbers)
+        result = function(*wide, **(named | wide_named))
+        return jax.tree.map(lambda x: x.astype(dtype) if jnp.issubdtype(x.dtype, jnp.floating) else x, result)
 
     return in_float32
 

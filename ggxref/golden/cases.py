@@ -7,7 +7,7 @@ from typing import Any
 
 from ggxref.golden.catalogue import Function
 from ggxref.golden.inputs import Draw
-from ggxref.golden.rounding import Format, decode, encode
+from ggxref.golden.rounding import Format, decode, encode, is_nan
 from ggxref.golden.stream import Stream
 from ggxref.golden.themes import Theme, themes
 
@@ -16,7 +16,7 @@ DIRECTIONS = frozenset({"wi", "wo", "wm"})
 
 @dataclass(frozen=True)
 class Case:
-    """The input of one test. `bits` and `values` are keyed by argument; vectors and matrices are nested tuples."""
+    """The input of one test. `bits` and `values` (None: NaN) are keyed by argument; vectors and matrices are nested."""
 
     function: Function
     fmt: Format
@@ -84,10 +84,27 @@ def case(seed: int, function: Function, fmt: Format, index: int) -> Case | None:
     if post == "stretch":
         exact = {a: stretched(Stream(*label, "stretch", a), fmt, q, exact[a]) for a, q in function.arguments.items()}
     bits = {a: mapped(lambda x: encode(x, fmt), x) for a, x in exact.items()}
-    if post == "minus zero":
-        negative = {a for a, q in function.arguments.items() if q in DIRECTIONS}
-        bits = {a: mapped(lambda b: b or fmt.sign, b) if a in negative else b for a, b in bits.items()}
-    values = {a: mapped(lambda b: decode(b, fmt), b) for a, b in bits.items()}
-    if any(values[a][2] <= 0 for a in function.above):
+    if any(decode(bits[a][2], fmt) <= 0 for a in function.above):
         return None
+    # A sampler may never look at a uniform number.
+    first = next(a for a, q in function.arguments.items() if q not in {"u", "u3", "rows"})
+    broken = {a: "" if post == "nan" and a != first else post or "" for a in bits}
+    bits = {a: altered(broken[a], q, bits[a], fmt) for a, q in function.arguments.items()}
+    values = {a: mapped(lambda b: None if is_nan(b, fmt) else decode(b, fmt), b) for a, b in bits.items()}
     return Case(function, fmt, theme, bits, values)
+
+
+def altered(post: str, quantity: str, bits: Any, fmt: Format) -> Any:
+    """The bits of an argument after a change that only bits can tell, or that breaks the argument."""
+    match post:
+        case "minus zero" if quantity in DIRECTIONS:
+            return mapped(lambda b: b or fmt.sign, bits)
+        case "negative alpha" if quantity == "alpha":
+            return bits[0] | fmt.sign, bits[1]
+        case "zero alpha" if quantity == "alpha":
+            return 0, bits[1]
+        case "nan":
+            # The last component: some functions look at the z of a direction alone.
+            nan = fmt.infinity | 1 << (fmt.precision - 2)
+            return (*bits[:-1], altered(post, quantity, bits[-1], fmt)) if isinstance(bits, tuple) else nan
+    return bits

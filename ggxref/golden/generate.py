@@ -17,6 +17,7 @@ from typing import Any
 import flint
 
 from ggxref.errors import InputError
+from ggxref.golden import invalid, reading, schema, text
 from ggxref.golden.cases import case
 from ggxref.golden.flags import SENTENCES
 from ggxref.golden.rounding import FORMATS
@@ -24,21 +25,19 @@ from ggxref.golden.samplers import FUNCTIONS
 from ggxref.golden.solve import test
 from ggxref.golden.themes import themes
 
-SCHEMA, MANIFEST_SCHEMA, MANIFEST = "ggxref-vectors-1", "ggxref-manifest-1", "manifest.json"
-# Raised whenever the same order gives other tests.
-VERSION = 1
-
 Group = tuple[str, str]
+FORMS = ("json", "text")
 
 
 @dataclass(frozen=True)
 class Order:
-    """What to generate: functions (by id), dtypes, tests in all (None: each theme of each function once), seed."""
+    """What to generate: functions (by id), dtypes, tests in all (None: each theme of each function once), seed, form."""
 
     functions: tuple[str, ...]
     dtypes: tuple[str, ...]
     count: int | None
     seed: int
+    form: str = "json"
 
     def quotas(self) -> dict[Group, int]:
         """Tests of each function and dtype, in proportion to the themes that concern the function."""
@@ -82,7 +81,7 @@ def document(order: Order, function: str, groups: dict[str, list[str]]) -> str:
     flags = {flag for tests in records.values() for record in tests for flag in record["flags"]}
     inputs = [compact([dtype, record["inputs"]]) for dtype, tests in records.items() for record in tests]
     header = {
-        "schema": SCHEMA,
+        "schema": schema.VECTORS,
         "function": f.name,
         "options": f.options,
         "derivative": f.derivative,
@@ -90,12 +89,12 @@ def document(order: Order, function: str, groups: dict[str, list[str]]) -> str:
         "source": f.source,
         "note": f.note,
         "generator": {
-            "version": VERSION,
+            "version": schema.VERSION,
             "flint": flint.__FLINT_VERSION__,
             "seed": order.seed,
             "inputs_sha256": sha256("\n".join(inputs).encode()),
         },
-        "flags": {flag: sentence for flag, sentence in SENTENCES.items() if flag in flags},
+        "flags": {flag: sentence for flag, sentence in (SENTENCES | invalid.SENTENCES).items() if flag in flags},
         "count": len(inputs),
     }
     optional = ("options", "derivative", "note")
@@ -107,11 +106,20 @@ def document(order: Order, function: str, groups: dict[str, list[str]]) -> str:
     return "{" + top + ',\n"groups": [\n' + ",\n".join(bodies) + "\n]}\n"
 
 
+def documents(order: Order, function: str, groups: dict[str, list[str]]) -> dict[str, tuple[int, bytes]]:
+    """A function's files, with the number of tests in each: one of JSON, or one of text a dtype."""
+    data = document(order, function, groups).encode()
+    if order.form == "json":
+        return {f"{function}.json": (sum(map(len, groups.values())), data)}
+    parsed = text.groups(reading.tests(data, function))
+    return {f"{function}.{fmt.name}.txt": text.vectors(f, fmt, group) for f, fmt, group in parsed}
+
+
 def sha256(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def order(functions: str, dtypes: str, count: int | None, seed: int) -> Order:
+def order(functions: str, dtypes: str, count: int | None, seed: int, form: str = "json") -> Order:
     """An order from comma-separated names; a function's may be a module's, and both may be `all`."""
     wanted = [name.strip() for name in functions.split(",")]
     for name in wanted:
@@ -125,7 +133,9 @@ def order(functions: str, dtypes: str, count: int | None, seed: int) -> Order:
     if count is not None and count < 1:
         raise InputError(f"--count: {count} is no number of tests")
     chosen = tuple(f for f in FUNCTIONS if any(belongs(f, name) for name in wanted))
-    return Order(chosen, tuple(dict.fromkeys(types)), count, seed)
+    if form not in FORMS:
+        raise InputError(f"--format: no form {form!r}; there are {', '.join(FORMS)}")
+    return Order(chosen, tuple(dict.fromkeys(types)), count, seed, form)
 
 
 def belongs(function: str, name: str) -> bool:
@@ -162,7 +172,7 @@ def generate(
     with tempfile.TemporaryDirectory(prefix=f".{directory.name}.", dir=directory.parent) as scratch:
         manifest = fill(order, quotas, Path(scratch), jobs, advance)
         directory.mkdir(exist_ok=True)
-        for name in [*manifest["files"], MANIFEST]:
+        for name in [*manifest["files"], schema.MANIFEST_NAME]:
             os.replace(Path(scratch, name), directory / name)
     return manifest
 
@@ -178,18 +188,18 @@ def fill(order: Order, quotas: dict[Group, int], scratch: Path, jobs: int, advan
                 groups[dtype] = results.pop((function, dtype))()
                 running.update("".join(line + "\n" for line in groups[dtype]).encode())
                 advance(quotas[function, dtype])
-            data = document(order, function, groups).encode()
-            name = f"{function}.json"
-            Path(scratch, name).write_bytes(data)
-            size = sum(map(len, groups.values()))
-            files[name] = {"sha256": sha256(data), "bytes": len(data), "count": size}
+            for name, (size, data) in documents(order, function, groups).items():
+                Path(scratch, name).write_bytes(data)
+                files[name] = {"sha256": sha256(data), "bytes": len(data), "count": size}
     manifest = {
-        "schema": MANIFEST_SCHEMA,
-        "generator": {"version": VERSION, "flint": flint.__FLINT_VERSION__, "seed": order.seed},
+        "schema": schema.MANIFEST,
+        "generator": {"version": schema.VERSION, "flint": flint.__FLINT_VERSION__, "seed": order.seed},
         "count": sum(quotas.values()),
         # Of all tests' lines, in this order: two large runs agree if this does.
         "tests_sha256": running.hexdigest(),
         "files": files,
     }
-    Path(scratch, MANIFEST).write_text(json.dumps(manifest, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    Path(scratch, schema.MANIFEST_NAME).write_text(
+        json.dumps(manifest, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+    )
     return manifest

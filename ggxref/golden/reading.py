@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from ggxref.errors import InputError
+from ggxref.golden import schema
 from ggxref.golden.catalogue import Function
-from ggxref.golden.generate import MANIFEST, MANIFEST_SCHEMA, SCHEMA
+from ggxref.golden.invalid import ALL_OUTCOMES
 from ggxref.golden.rounding import FORMATS, Format, from_hex
 from ggxref.golden.samplers import FUNCTIONS
 
+SHIPPED = Path(__file__).with_name("data")
 # No honest file is larger; a manifest's claims are checked against it before anything is read.
 LARGEST_FILE = 1 << 30
 # Outermost length and so on of each quantity; a number is ().
@@ -31,23 +33,31 @@ SHAPES |= dict.fromkeys(("alpha", "u", "mean", "slope"), (2,))
 
 
 @dataclass(frozen=True)
-class Test:
-    """One test: bits of inputs and result, nested as the function takes and returns them.
+class Result:
+    """Bits of the correctly rounded result, nested as the function returns it, and the error it allows.
 
     `flushed` is the result for inputs whose subnormals are taken for zeros.
     """
 
-    function: Function
-    fmt: Format
-    id: int
-    flags: tuple[str, ...]
-    inputs: dict[str, Any]
     exact: Any
     expected: Any
     condition: float
     spread: float
     ulp: int
     flushed: Any
+
+
+@dataclass(frozen=True)
+class Test:
+    """One test. `result` is None, and `outcomes` (`invalid`) are not, where the input is broken and has no value."""
+
+    function: Function
+    fmt: Format
+    id: int
+    flags: tuple[str, ...]
+    inputs: dict[str, Any]
+    result: Result | None
+    outcomes: tuple[str, ...]
 
 
 def need(condition: object, message: str) -> None:
@@ -125,31 +135,35 @@ def test(record: Any, function: Function, fmt: Format, flags: dict[str, str], wh
     named = entry(record, "flags", list, where)
     for flag in named:
         need(isinstance(flag, str) and flag in flags, f"{where}: flag {flag!r} is not in the file's list")
+    outcomes = record.get("outcomes", [])
+    known = isinstance(outcomes, list) and set(map(str, outcomes)) <= set(ALL_OUTCOMES)
+    need(known, f"{where}: 'outcomes' wants a list of {', '.join(ALL_OUTCOMES)}, got {kind(outcomes)}")
+    inputs = {a: words(x, fmt, f"{where}, {a}") for a, x in inputs.items()}
+    valued = not outcomes or "value" in outcomes
+    answer = result(record, fmt, where) if valued else None
+    return Test(function, fmt, entry(record, "id", int, where), tuple(named), inputs, answer, tuple(outcomes))
+
+
+def result(record: dict[str, Any], fmt: Format, where: str) -> Result:
+    """The part of a test that tells the result."""
     ulp = entry(record, "ulp", int, where)
     need(ulp >= 0, f"{where}: 'ulp' wants a number >= 0, got {ulp}")
-    condition, spread = (positive(record, key, where) for key in ("condition", "spread"))
     expected = words(entry(record, "expected", (str, list), where), fmt, f"{where}, expected")
-    flushed = words(record["flushed"], fmt, f"{where}, flushed") if "flushed" in record else expected
-    return Test(
-        function,
-        fmt,
-        entry(record, "id", int, where),
-        tuple(named),
-        {a: words(x, fmt, f"{where}, {a}") for a, x in inputs.items()},
+    return Result(
         entry(record, "exact", (str, list), where),
         expected,
-        condition,
-        spread,
+        positive(record, "condition", where),
+        positive(record, "spread", where),
         ulp,
-        flushed,
+        words(record["flushed"], fmt, f"{where}, flushed") if "flushed" in record else expected,
     )
 
 
 def tests(text: bytes, where: str) -> Iterator[Test]:
     """The tests of one file."""
     document = object_of(text, where)
-    schema = entry(document, "schema", str, where)
-    need(schema == SCHEMA, f"{where}: wanted schema {SCHEMA!r}, got {schema!r}")
+    version = entry(document, "schema", str, where)
+    need(version == schema.VECTORS, f"{where}: wanted schema {schema.VECTORS!r}, got {version!r}")
     name, options = entry(document, "function", str, where), document.get("options", {})
     need(isinstance(options, dict), f"{where}: 'options' wants a JSON object, got {kind(options)}")
     derivative = document.get("derivative")
@@ -177,10 +191,10 @@ def contents(path: Path) -> bytes:
 
 def read(directory: Path) -> Iterator[Test]:
     """The tests of a directory of vectors, each file checked against the manifest."""
-    path = directory / MANIFEST
+    path = directory / schema.MANIFEST_NAME
     manifest = object_of(contents(path), str(path))
-    schema = entry(manifest, "schema", str, str(path))
-    need(schema == MANIFEST_SCHEMA, f"{path}: wanted schema {MANIFEST_SCHEMA!r}, got {schema!r}")
+    version = entry(manifest, "schema", str, str(path))
+    need(version == schema.MANIFEST, f"{path}: wanted schema {schema.MANIFEST!r}, got {version!r}")
     for name, claim in entry(manifest, "files", dict, str(path)).items():
         where = f"{path}: {name!r}"
         # A name is a file of this directory, and nothing else on the machine.

@@ -7,6 +7,7 @@ from typing import Any
 
 from flint import arb
 
+from ggxref.golden import invalid
 from ggxref.golden.budget import allowance, sensitivity
 from ggxref.golden.cases import Case, leaves, mapped
 from ggxref.golden.catalogue import Function
@@ -74,6 +75,18 @@ def flushed(case: Case) -> Exact | None:
 
 def test(case: Case) -> dict[str, Any] | None:
     """The test's record but for its id; None where it has no proven or no useful result."""
+    broken = invalid.broken(case)
+    valued = not broken or invalid.continues(case)
+    result = solved(case) if valued else None
+    if valued and not result:
+        return None
+    flags = [invalid.FLAGS[broken]] if broken else []
+    record = {"flags": flags, "inputs": mapped_values(lambda b: to_hex(b, case.fmt), case.bits)}
+    return record | (invalid.outcomes(broken, valued) if broken else {}) | (result or {})
+
+
+def solved(case: Case) -> dict[str, Any] | None:
+    """Flags, result and budget of a case."""
     fmt = case.fmt
     try:
         exact, other = proven(case.function, case.values, fmt), flushed(case)
@@ -87,9 +100,8 @@ def test(case: Case) -> dict[str, Any] | None:
     except (ArithmeticError, ValueError):
         # A result exactly on a decision (a tie, a jump), beyond every dtype, or outside the function's domain.
         return None
-    record = {
-        "flags": flags_of(Stressed(case, exact.values)),
-        "inputs": mapped_values(lambda b: to_hex(b, fmt), case.bits),
+    flags = {} if invalid.broken(case) else {"flags": flags_of(Stressed(case, exact.values))}
+    record = flags | {
         "exact": exact.digits,
         "expected": mapped(lambda b: to_hex(b, fmt), exact.expected),
         "condition": float(found.condition),

@@ -2,7 +2,7 @@
 
 A theme is used for a function that takes all of the theme's quantities. `_post` names a change made after the draw:
 `swap` exchanges x and y in the test of the same theme unswapped, `stretch` makes directions longer or shorter by a few
-ulp, `minus zero` turns +0 into −0.
+ulp, `minus zero` turns +0 into −0, and the `INVALID` ones break an input.
 """
 
 from collections.abc import Iterator, Mapping
@@ -99,7 +99,12 @@ THEMES: list[Theme] = [
     {"f0": "one"},
     {"F": "one"},
     {"G2": "zero"},
+    {"alpha": "plain", "_post": "negative alpha"},
+    {"alpha": "plain", "_post": "zero alpha"},
+    {"_post": "nan"},
 ]
+# These leave the functions' domains: no result is right, some are acceptable.
+INVALID = frozenset({"negative alpha", "zero alpha", "nan"})
 
 # Arguments drawn from another quantity's variant.
 _FROM = {"u3": "u", "rows": "u", "mean": "A", "scatter": "A", "n_i": "eta", "factors": "alpha"}
@@ -111,9 +116,15 @@ def themes(function: Function) -> list[Theme]:
     quantities |= {_FROM[q] for q in quantities if q in _FROM}
     if "slope" in quantities:
         quantities.add("wm")
-    corners = [t for t in THEMES if {q for q in t if q != "_post"} <= quantities | shapes(quantities)]
+    corners = [t for t in THEMES if concerns(t, quantities)]
     plain = [[PLAIN] if i % 2 else [] for i in range(len(corners))]
     return [PLAIN, *(theme for corner, more in zip(corners, plain, strict=True) for theme in (corner, *more))]
+
+
+def concerns(theme: Theme, quantities: set[str]) -> bool:
+    # alpha breaks only what takes alpha itself.
+    known = quantities if theme.get("_post") in INVALID else quantities | shapes(quantities)
+    return {q for q in theme if q != "_post"} <= known
 
 
 def shapes(quantities: set[str]) -> set[str]:

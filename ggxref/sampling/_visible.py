@@ -16,6 +16,7 @@ def _density(wm, wi, D, sigma):
     return jnp.where(seen, cosine * D / jnp.where(seen, sigma, 1), 0)
 
 
+@stable.widened
 def pdf_ggx(wm: Vec3, wi: Vec3, alpha: Vec2) -> Scalar:
     r"""Density of the visible GGX normals: $\max(0, \omega_i\cdot\omega_m) D(\omega_m)/\sigma(\omega_i)$ [1/sr].
 
@@ -28,6 +29,7 @@ def pdf_ggx(wm: Vec3, wi: Vec3, alpha: Vec2) -> Scalar:
     return _density(wm, wi, ndf.ggx(wm, alpha), slopes.sigma_ggx(wi, alpha))
 
 
+@stable.widened
 def pdf_beckmann(wm: Vec3, wi: Vec3, alpha: Vec2) -> Scalar:
     r"""Density of the visible Beckmann normals: $\max(0, \omega_i\cdot\omega_m) D(\omega_m)/\sigma(\omega_i)$ [1/sr].
 
@@ -38,6 +40,7 @@ def pdf_beckmann(wm: Vec3, wi: Vec3, alpha: Vec2) -> Scalar:
     return _density(wm, wi, ndf.beckmann(wm, alpha), slopes.sigma_beckmann(wi, alpha))
 
 
+@stable.widened
 def pdf_ellipsoid(wm: Vec3, wi: Vec3, A: Mat3) -> Scalar:
     r"""Density of the visible normals of the ellipsoid NDF: $\max(0, \omega_i\cdot\omega_m) D(\omega_m)/\sigma(\omega_i)$ [1/sr].
 

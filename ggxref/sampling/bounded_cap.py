@@ -13,11 +13,12 @@ def _bound_terms(wi, alpha):
     a = jnp.minimum(jnp.minimum(alpha[0], alpha[1]), 1)
     s = 1 + length(wi[0], wi[1], 0)
     denominator = s * s + (a * wi[2]) ** 2
-    above = wi[2] > 0
-    k = jnp.where(above, (1 - a) * (1 + a) * s * s / denominator, 1)
-    return k, jnp.where(above, a * a * (s * s + wi[2] ** 2) / denominator, 0)
+    below = wi[2] <= 0  # said so that a NaN shows
+    k = jnp.where(below, 1, (1 - a) * (1 + a) * s * s / denominator)
+    return k, jnp.where(below, 0, a * a * (s * s + wi[2] ** 2) / denominator)
 
 
+@stable.widened
 def bound(wi: Vec3, alpha: Vec2) -> Scalar:
     r"""$k = (1-a^2)s^2/(s^2 + a^2z_i^2)$, $a = \min(\alpha_x, \alpha_y, 1)$, $s = 1 + \|(x_i, y_i)\|$: the cap ends at $-k z_i'$.
 
@@ -29,6 +30,7 @@ def bound(wi: Vec3, alpha: Vec2) -> Scalar:
     return _bound_terms(wi, alpha)[0]
 
 
+@stable.widened
 def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
     r"""As `spherical_cap.sample` with the cap $\{z > -k z_i'\}$: only for single reflection.
 
@@ -41,6 +43,7 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
     return unstretch(*half_in_cap(u, i, _bound_terms(wi, alpha)[1] * i.z), alpha)
 
 
+@stable.widened
 def pdf(wm: Vec3, wi: Vec3, alpha: Vec2) -> Scalar:
     r"""$2 D(\omega_m)\max(0, \omega_i\cdot\omega_m)/(k z_i + \|(\alpha_x x_i, \alpha_y y_i, z_i)\|)$ [1/sr], 0 outside the cap.
 

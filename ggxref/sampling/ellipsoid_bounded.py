@@ -40,6 +40,7 @@ def _cut(wi, i, canonical_A):
     return jnp.where(wi[2] > 0, wi[2] * c_square / (i.norm * (c_square + q)), 0)
 
 
+@stable.widened
 def bound(wi: Vec3, A: Mat3) -> Scalar:
     r"""Lower end of the cap in sphere space: $i_z/(\|A\omega_i\|\max Q) - i_z'$; $-i_z'$ where `wi` is not above the horizon.
 
@@ -53,6 +54,7 @@ def bound(wi: Vec3, A: Mat3) -> Scalar:
     return jnp.where(wi[2] > 0, -fall / i.norm, -i.z)
 
 
+@stable.widened
 def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:
     """As `ellipsoid_cap.sample` with the cap's lower end at `bound`: only for single reflection.
 
@@ -64,6 +66,7 @@ def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:
     return from_sphere(*half_in_cap(u, i, _cut(wi, i, A)), A)
 
 
+@stable.widened
 def pdf(wm: Vec3, wi: Vec3, A: Mat3) -> Scalar:
     r"""$2 D(\omega_m)\max(0, \omega_i\cdot\omega_m)/(\|A\omega_i\|(1 - L))$, `L` the `bound` [1/sr]; 0 outside the cap.
 

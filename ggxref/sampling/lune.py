@@ -46,6 +46,7 @@ def _frame(wi, A):
     return jnp.stack([e1, e2, e3]), pole, norm_n
 
 
+@stable.widened
 def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:
     """Draw a point of the disk, compress it to the lune's crescent, lift it to the sphere, map it to the ellipsoid.
 
@@ -79,6 +80,7 @@ def _disk(u):
     return r * cos_phi, r * sin_phi
 
 
+@stable.widened
 def sample_rejection_ellipsoid(u: Tries, wi: Vec3, A: Mat3) -> tuple[Vec3, Int[Array, ""]]:
     """Version 2: points of the ellipsoid's own silhouette until one lies on the lune.
 
@@ -99,6 +101,7 @@ def sample_rejection_ellipsoid(u: Tries, wi: Vec3, A: Mat3) -> tuple[Vec3, Int[A
     return _first(*jax.vmap(attempt)(u))
 
 
+@stable.widened
 def sample_rejection_sphere(u: Tries, wi: Vec3, A: Mat3) -> tuple[Vec3, Int[Array, ""]]:
     """Version 1: rays through the silhouette of the bounding sphere until one meets the lune.
 
@@ -109,8 +112,7 @@ def sample_rejection_sphere(u: Tries, wi: Vec3, A: Mat3) -> tuple[Vec3, Int[Arra
     """
     cof, det = cofactor(A)
     # The longest half axis: the largest singular value of A^{-T}, which has more digits than the smallest of A.
-    wide = (cof / det).astype(jnp.promote_types(A.dtype, jnp.float32))  # no half-precision singular values
-    radius = jnp.linalg.svd(wide, compute_uv=False)[0].astype(A.dtype)
+    radius = jnp.linalg.svd(cof / det, compute_uv=False)[0]
     t, b, _ = basis(wi)
     a = jnp.stack(times(A, *wi))
     a_square = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]

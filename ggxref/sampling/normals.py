@@ -31,11 +31,13 @@ def sample_beckmann(u: Vec2, alpha: Vec2) -> Vec3:
     return unstretch(r * cos_phi, r * sin_phi, jnp.ones_like(r), alpha)
 
 
+@stable.widened
 def pdf_ggx(wm: Vec3, alpha: Vec2) -> Scalar:
     r"""$D(\omega_m)(\omega_m\cdot n)$ for GGX [1/sr]. `wm`: unit, (3,). heitz2014 §2.2."""
     return ndf.ggx(wm, alpha) * wm[2]
 
 
+@stable.widened
 def pdf_beckmann(wm: Vec3, alpha: Vec2) -> Scalar:
     r"""$D(\omega_m)(\omega_m\cdot n)$ for Beckmann [1/sr]. `wm`: unit, (3,). heitz2014 §2.2."""
     return ndf.beckmann(wm, alpha) * wm[2]

@@ -29,9 +29,12 @@ def sample(u: Vec3, wi: Vec3, alpha: Vec2, *, distribution: Literal["ggx", "beck
     """
     wm = _SAMPLE[distribution](u[:2], alpha)
     other = jnp.stack([-wm[0], -wm[1], wm[2]])
-    return jnp.where(u[2] < _share(other, wi), other, wm)
+    share = _share(other, wi)
+    # A view that is NaN chooses neither wall.
+    return jnp.where(u[2] < share, other, jnp.where(u[2] >= share, wm, jnp.nan))
 
 
+@stable.widened
 def pdf(wm: Vec3, wi: Vec3, alpha: Vec2, *, distribution: Literal["ggx", "beckmann"] = "ggx") -> Scalar:
     r"""$2\frac{\langle\omega_i,\omega_m\rangle}{\langle\omega_i,\omega_m\rangle + \langle\omega_i,\omega_m'\rangle}
     (\omega_m\cdot n) D(\omega_m)$, $\omega_m' = (-x_m, -y_m, z_m)$ [1/sr].

@@ -1,0 +1,154 @@
+"""Answers from Python functions: called a point at a time with NumPy arrays, or, for JAX, mapped and compiled."""
+
+import importlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ggxref.errors import InputError
+from ggxref.golden.cases import mapped
+from ggxref.golden.catalogue import Function
+from ggxref.golden.reading import Test
+from ggxref.golden.rounding import Format
+from ggxref.golden.verdict import Failure
+
+WORDS = {64: np.uint64, 32: np.uint32, 16: np.uint16}
+
+
+@dataclass(frozen=True)
+class Implementation:
+    """A module, or a mapping from the vectors' names to `module:attribute`; `jax`: its functions are JAX functions."""
+
+    module: str
+    mapping: dict[str, str]
+    jax: bool
+
+    def find(self, function: Function) -> tuple[Callable[..., Any], bool] | None:
+        """The callable for a catalogue entry, and whether it is to be differentiated still; None if there is none."""
+        for name, whole in ((function.id, True), (function.name, not function.derivative)):
+            if name in self.mapping:
+                module, _, path = self.mapping[name].partition(":")
+                found = attribute(module, path)
+            else:
+                found = attribute(self.module, name) if self.module and name == function.name else None
+            if found is not None and (whole or self.jax):
+                options = {} if name in self.mapping and name == function.id else function.options
+                return partial(found, **options), not whole
+        return None
+
+
+def attribute(module: str, path: str) -> Any:
+    """`module.path`, importing submodules on the way; None where there is none."""
+    found = importlib.import_module(module)
+    for i, name in enumerate(parts := path.split(".")):
+        try:
+            found = getattr(found, name)
+        except AttributeError:
+            try:
+                found = importlib.import_module(".".join([module, *parts[: i + 1]]))
+            except ImportError:
+                return None
+    return found
+
+
+def implementation(module: str, mapping: Path | None, jax: bool) -> Implementation:
+    """Checked: the module imports, and each name of the mapping file leads to something."""
+    names: dict[str, str] = {}
+    if mapping:
+        try:
+            names = json.loads(mapping.read_bytes())
+        except OSError as error:
+            raise InputError(f"{mapping}: cannot be read: {error.strerror}") from None
+        except (ValueError, RecursionError) as error:
+            raise InputError(f"{mapping}: not JSON: {error}") from None
+        if not isinstance(names, dict) or not all(isinstance(v, str) and ":" in v for v in names.values()):
+            raise InputError(f'{mapping}: wanted {{"ndf.ggx": "module:function", …}}')
+    for name in [module, *(value.partition(":")[0] for value in names.values())]:
+        try:
+            importlib.import_module(name)
+        except Exception as error:  # a module may fail in any way while it is imported
+            raise InputError(f"--python: {name!r} cannot be imported: {type(error).__name__}: {error}") from None
+    for name, target in names.items():
+        owner, _, path = target.partition(":")
+        if attribute(owner, path) is None:
+            raise InputError(f"{mapping}: {name!r} leads to {target!r}, which does not exist")
+    return Implementation(module, names, jax)
+
+
+def dtype(fmt: Format) -> Any:
+    if fmt.name == "bf16":
+        from ml_dtypes import bfloat16
+
+        return np.dtype(bfloat16)
+    return np.dtype({"f64": np.float64, "f32": np.float32, "f16": np.float16}[fmt.name])
+
+
+def numbers(bits: Any, fmt: Format) -> Any:
+    """Bits as an array of the dtype; a number alone as a NumPy scalar."""
+    return np.array(bits, dtype=WORDS[fmt.width]).view(dtype(fmt))[()]
+
+
+def bits_of(result: Any, fmt: Format) -> Any:
+    """A result's bits, nested as it is, each number rounded to the dtype."""
+    if isinstance(result, tuple | list):
+        return tuple(bits_of(part, fmt) for part in result)
+    with np.errstate(all="ignore"):
+        array = np.asarray(result).astype(dtype(fmt))
+    return nested(array.view(WORDS[fmt.width]).tolist())
+
+
+def nested(x: Any) -> Any:
+    return tuple(map(nested, x)) if isinstance(x, list) else x
+
+
+def ask(implementation: Implementation, tests: list[Test]) -> list[Any] | None:
+    """Answers to the tests of one function and dtype; None if the implementation has no such function."""
+    found = implementation.find(tests[0].function)
+    if found is None:
+        return None
+    f, differentiate = found
+    fmt = tests[0].fmt
+    if implementation.jax:
+        return compiled(f, differentiate, tests)
+    return [guarded(f, {a: numbers(x, fmt) for a, x in t.inputs.items()}, fmt) for t in tests]
+
+
+def guarded(f: Callable[..., Any], inputs: dict[str, Any], fmt: Format) -> Any:
+    try:
+        with np.errstate(all="ignore"):
+            return bits_of(f(**inputs), fmt)
+    except Exception as error:  # whatever somebody's code raises is its answer
+        return Failure(f"{type(error).__name__}: {error}"[:200])
+
+
+# Compiles twice as fast; the kernels compute the same operations.
+COMPILER_OPTIONS = {"xla_cpu_use_fusion_emitters": False}
+
+
+def compiled(f: Callable[..., Any], differentiate: bool, tests: list[Test]) -> list[Any]:
+    """All tests of the group at once, through `jax.jit(jax.vmap(f))`."""
+    import jax
+
+    function, fmt = tests[0].function, tests[0].fmt
+    inputs = {a: numbers([t.inputs[a] for t in tests], fmt) for a in function.arguments}
+
+    def point(values: dict[str, Any]) -> Any:
+        if not differentiate:
+            return f(**values)
+        rest = {a: x for a, x in values.items() if a != function.derivative}
+        value, slopes = jax.value_and_grad(lambda x: f(**rest, **{function.derivative: x}))(values[function.derivative])
+        return jax.numpy.concatenate([value[None], slopes.ravel()])
+
+    try:
+        # A setting of this thread alone: groups of other dtypes are compiled beside this one.
+        with jax.enable_x64(fmt.name == "f64"):
+            options = COMPILER_OPTIONS if jax.default_backend() == "cpu" else {}
+            result = jax.jit(jax.vmap(point), compiler_options=options)(inputs)
+            return [bits_of(mapped(lambda x, i=i: np.asarray(x)[i], result), fmt) for i in range(len(tests))]
+    except Exception as error:  # whatever somebody's code raises is its answer
+        return [Failure(f"{type(error).__name__}: {error}"[:200])] * len(tests)
