@@ -147,7 +147,9 @@ def vectors(
 
 @app.command(epilog="Example: ggxref fit surface.x3p --level 2 --json fit.json --figure fit.pdf")
 def fit(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A BRDF or a height field; its format is recognised.")],
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE…", help="BRDFs or height fields; their formats are recognised.")
+    ],
     model: Annotated[
         str,
         typer.Option(help="Shapes to try: isotropic, anisotropic, rotated, ellipsoid, separated by commas; or all."),
@@ -160,35 +162,49 @@ def fit(
     fix: Annotated[
         list[str] | None, typer.Option(metavar="NAME=VALUE", help="Hold a parameter: alpha=0.1, diffuse=0, A=a,b,…")
     ] = None,
+    tolerance: Annotated[
+        float | None, typer.Option(help="Choose the smallest model within this held-out loss of the best.")
+    ] = None,
     min_cosine: Annotated[float, typer.Option(help="BRDF: leave out directions nearer to the horizon.")] = 0.05,
     samples: Annotated[int, typer.Option(help="BRDF: fit at most this many, evenly through the file.")] = 4096,
     level: Annotated[int, typer.Option(help="Heights: degree of the polynomial that is taken off first.")] = 1,
     pixel: Annotated[
         str | None, typer.Option(metavar="DX[,DY]", help="Heights: pixel size in metres, if FILE does not say it.")
     ] = None,
+    bootstrap: Annotated[
+        int, typer.Option(help="Intervals from this many replicates, and not from standard errors.", min=0)
+    ] = 0,
     json: Annotated[Path | None, typer.Option(metavar="PATH", help="Write the fit here too.")] = None,
     figure: Annotated[Path | None, typer.Option(metavar="PATH", help="Draw it: .pdf, .png or .svg.")] = None,
+    export: Annotated[
+        str | None, typer.Option(metavar="FORM", help="Print it as mitsuba, pbrt, gltf, materialx or json say it.")
+    ] = None,
+    nearest: Annotated[bool, typer.Option("--nearest", help="Export: what is closest, if FORM cannot say it.")] = False,
+    table: Annotated[
+        Path | None, typer.Option(metavar="PATH.csv", help="Many files: a row each; run it again to go on.")
+    ] = None,
 ) -> None:
     """Fit NDF parameters to measured reflectance or heights, with the simplest model that suffices."""
-    console = Console()
-    with Console(stderr=True).status(f"fitting {file.name}"):
-        from ggxref.fit import fitting, options, readers, report
+    from ggxref.fit import command, options
 
-        options.writable("--json", json)
-        options.writable("--figure", figure)
-        if figure:
-            from ggxref.fit import figures
-
-            figures.check(figure)
-        given = {"model": model, "tail": tail, "masking": masking, "fresnel": fresnel, "min_cosine": min_cosine}
-        given |= {"samples": samples, "degree": level, "fixed": options.fixed(fix or [])}
-        ladder = fitting.fit(readers.read(file, pixel=options.pixel(pixel)), **given)
-        console.print(report.tables(ladder))
-        if json:
-            write_atomically(json, dumps(report.document(ladder, given), indent=1) + "\n")
-        if figure:
-            write_atomically(figure, figures.draw(ladder, figure.suffix))
-    if ladder.best.trouble:
+    for option, path in (("--json", json), ("--figure", figure), ("--table", table)):
+        options.writable(option, path)
+    given = {"model": model, "tail": tail, "masking": masking, "fresnel": fresnel, "min_cosine": min_cosine}
+    given |= {"samples": samples, "degree": level, "fixed": options.fixed(fix or []), "tolerance": tolerance}
+    size = options.pixel(pixel)
+    if table:
+        alone = [name for name, value in (("--json", json), ("--figure", figure), ("--export", export)) if value]
+        if alone:
+            raise InputError(f"{alone[0]} is for one FILE; --table is for many")
+        with _progress("files", len(files)) as advance:
+            good = command.many(files, table, given, size, advance)
+    else:
+        if len(files) != 1:
+            raise InputError(f"{len(files)} files; need one, or --table PATH.csv for a row each")
+        outputs = command.Outputs(json, figure, export, nearest, bootstrap)
+        with Console(stderr=True).status(f"fitting {files[0].name}"):
+            good = command.one(files[0], given, size, outputs)
+    if not good:
         raise typer.Exit(1)
 
 

@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,7 +31,8 @@ TAILS = ("ggx", "student_t")
 class Fit:
     """One model's minimum.
 
-      - `tail`: the formula used. `space`: the model's free directions; `theta`: (p,), see `parameters`; `covariance` of θ, (p, p).
+      - `tail`: the formula used. `space`: the model's free directions, `identified` those that did not run to a bound.
+    - `theta`: (p,), see `parameters`; `covariance` of θ, (p, p).
       - `values`, `errors`: of the parameters and of what follows from them, by name, in the user's terms.
       - `loss`: the mean that was minimised; `held_out`: the same on each fold, fitted without it.
       - `log_rmse`: of reflectance, over positive samples; NaN for slopes.
@@ -40,6 +42,7 @@ class Fit:
     model: Model
     tail: str
     space: Space
+    identified: Space
     theta: np.ndarray
     covariance: np.ndarray
     values: dict[str, float]
@@ -70,6 +73,21 @@ class Ladder:
         return next(fit for fit in self.fits if fit.model.name == self.chosen)
 
 
+@dataclass(frozen=True)
+class Options:
+    """The arguments of `fit`, of which many measurements share one set."""
+
+    model: str = AUTO
+    tail: str = AUTO
+    masking: str = "height_correlated"
+    fresnel: str = "schlick"
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    min_cosine: float = 0.05
+    samples: int = 4096
+    degree: int = 1
+    tolerance: float | None = None
+
+
 def fit(
     measurement: Reflectance | Heights,
     *,
@@ -81,6 +99,7 @@ def fit(
     min_cosine: float = 0.05,
     samples: int = 4096,
     degree: int = 1,
+    tolerance: float | None = None,
 ) -> Ladder:
     """Fit every model of these shapes and tails, and choose the smallest that suffices.
 
@@ -91,31 +110,77 @@ def fit(
     - `min_cosine`: reflectance uses samples whose cosines with the normal exceed it.
     - `samples`: of reflectance, at most; more are thinned evenly.
     - `degree`: of the polynomial that levels a height field.
+    - `tolerance`: the smallest model within this held-out loss of the best is chosen; without it, within one standard error.
     """
-    _check_range(min_cosine, samples, degree)
-    shapes = _choice("model", model, tuple(parameters.SHAPES), tuple(parameters.SHAPES))
-    tails = _choice("tail", tail, parameters.TAILS, TAILS)
-    _choice("masking", masking, ("height_correlated", "separable", "v_cavity"))
-    _choice("fresnel", fresnel, tuple(parameters.FRESNEL))
+    given = Options(
+        model=model,
+        tail=tail,
+        masking=masking,
+        fresnel=fresnel,
+        fixed=fixed or {},
+        min_cosine=min_cosine,
+        samples=samples,
+        degree=degree,
+        tolerance=tolerance,
+    )
+    return fit_prepared([prepare(measurement, given)])[0]
+
+
+class Prepared(NamedTuple):
+    """A measurement made into a problem, the models to try on it, and the entries of θ that they hold."""
+
+    measurement: Reflectance | Heights
+    problem: Problem
+    wanted: list[Model]
+    held: dict[str, float]
+    tolerance: float | None
+
+    @property
+    def kind(self) -> tuple:
+        """Problems of one kind are solved side by side."""
+        return self.problem.surface, self.problem.parameters, tuple(model.name for model in self.wanted)
+
+
+def prepare(measurement: Reflectance | Heights, options: Options) -> Prepared:
+    shapes = _choice("model", options.model, tuple(parameters.SHAPES), tuple(parameters.SHAPES))
+    tails = _choice("tail", options.tail, parameters.TAILS, TAILS)
+    _check(options)
     if isinstance(measurement, Reflectance):
-        surface = Surface(masking=masking, fresnel=fresnel)
-        problem = from_reflectance(measurement, surface, min_cosine=min_cosine, most=samples)
+        surface = Surface(masking=options.masking, fresnel=options.fresnel)
+        problem = from_reflectance(measurement, surface, min_cosine=options.min_cosine, most=options.samples)
     else:
-        problem = from_surface(measurement, degree=degree)
-    held = _fixed(fixed or {}, problem.parameters)
-    fits = fit_models(problem, _wanted(shapes, model == AUTO, tails, problem, held), held)
-    sound = [fit for fit in fits if not fit.trouble] or fits
-    chosen = selection.choose([fit.model.name for fit in sound], np.stack([fit.held_out for fit in sound]))
-    return Ladder(measurement, problem, fits, chosen)
+        problem = from_surface(measurement, degree=options.degree)
+    held = _fixed(options.fixed, problem.parameters)
+    wanted = _wanted(shapes, options.model == AUTO, tails, problem, held)
+    return Prepared(measurement, problem, wanted, held, options.tolerance)
 
 
-def _check_range(min_cosine: float, samples: int, degree: int) -> None:
-    if not 0 <= min_cosine < 1:
-        raise InputError(f"smallest cosine {min_cosine:g}; need a number from 0 to below 1")
-    if samples < FEWEST:
-        raise InputError(f"at most {samples} samples; need at least {FEWEST}")
-    if not 0 <= degree <= 8:
-        raise InputError(f"levelling by a polynomial of degree {degree}; need 0 (the mean), 1 (a plane), up to 8")
+def fit_prepared(several: Sequence[Prepared]) -> list[Ladder]:
+    """The ladders of problems of one kind."""
+    found = fit_many([each.problem for each in several], several[0].wanted, [each.held for each in several])
+    ladders = []
+    for each, fits in zip(several, found, strict=True):
+        sound = [fit for fit in fits if not fit.trouble] or fits
+        losses = np.stack([fit.held_out for fit in sound])
+        chosen = selection.choose([fit.model.name for fit in sound], losses, each.tolerance)
+        ladders.append(Ladder(each.measurement, each.problem, fits, chosen))
+    return ladders
+
+
+def _check(options: Options) -> None:
+    """Options that the user may give beyond their range."""
+    _choice("masking", options.masking, ("height_correlated", "separable", "v_cavity"))
+    _choice("fresnel", options.fresnel, tuple(parameters.FRESNEL))
+    if not 0 <= options.min_cosine < 1:
+        raise InputError(f"smallest cosine {options.min_cosine:g}; need a number from 0 to below 1")
+    if options.samples < FEWEST:
+        raise InputError(f"at most {options.samples} samples; need at least {FEWEST}")
+    if not 0 <= options.degree <= 8:
+        raise InputError(
+            f"levelling by a polynomial of degree {options.degree}; need 0 (the mean), 1 (a plane), up to 8"
+        )
+    if options.tolerance is not None and not 0 <= options.tolerance < math.inf:
+        raise InputError(f"tolerance {options.tolerance:g}; need a loss, 0 or more")
 
 
 def _choice(what: str, words: str, known: tuple[str, ...], auto: tuple[str, ...] = ()) -> tuple[str, ...]:
@@ -198,6 +263,7 @@ def _fit(problem: Problem, model: Model, tail: str, space: Space, found: Found) 
         model=model,
         tail=tail,
         space=space,
+        identified=found.space,
         theta=found.theta,
         covariance=wide.covariance,
         values=values,

@@ -8,23 +8,26 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from ggxref.fit import models, parameters
+from ggxref.fit import identification, models, parameters, solver
 from ggxref.fit.data import Heights
 from ggxref.fit.fitting import Fit, Ladder
+
+Intervals = dict[str, tuple[float, float]]
 
 DEGREES = ("rotation",)
 
 
-def tables(ladder: Ladder) -> RenderableType:
-    """What was fitted, the ladder of models, and the chosen model's parameters."""
+def tables(ladder: Ladder, intervals: Intervals | None = None) -> RenderableType:
+    """What was fitted, the ladder of models, and the chosen model's parameters, with these intervals or the fit's own."""
     source, best = ladder.measurement.source, ladder.best
     parts: list[RenderableType] = [Text(f"{source.path} ({source.format})", style="bold")]
     parts += [Text(f"  {note}") for note in ladder.problem.notes]
     parts += ["", _ladder(ladder), ""]
     if len(ladder.fits) > 1:
         parts += [Text(f"Smallest model that suffices: {best.model.name}", style="bold"), ""]
-    parts.append(_parameters(best))
+    parts.append(_parameters(best, intervals or best.intervals))
     parts += [Text(f"{fit.model.name}: {fit.trouble}", style="bold") for fit in ladder.fits if fit.trouble]
+    parts += [Text(sentence, style="bold") for sentence in identification.warnings(ladder)]
     if best.agreeing[0] == 1:
         parts.append(
             Text(f"Only one of {best.agreeing[1]} starts ended here: there may be a better minimum", style="bold")
@@ -66,15 +69,18 @@ def _table(title: str, names: str) -> Table:
     return table
 
 
-def _parameters(fit: Fit) -> Table:
+def _parameters(fit: Fit, intervals: Intervals) -> Table:
     table = _table(f"Parameters, {fit.model.name}", "parameter")
     table.add_column("value", justify="right", no_wrap=True)
     table.add_column("std. error", justify="right", no_wrap=True)
+    table.add_column("95 % interval", justify="right", no_wrap=True)
     table.add_column("meaning")
     for name, value, error, free in rows(fit):
         unit = 180 / math.pi if name in DEGREES else 1.0
         shown = _number(error * unit) if free else "held"
-        table.add_row(name, _number(value * unit), shown, MEANING[name.partition(" ")[0]])
+        low, high = intervals["alpha_x" if name == "alpha" else name]
+        between = f"{_number(low * unit)} to {_number(high * unit)}" if free and error else ""
+        table.add_row(name, _number(value * unit), shown, between, MEANING[name.partition(" ")[0]])
     return table
 
 
@@ -117,7 +123,7 @@ def _number(value: float) -> str:
     return "-" if not math.isfinite(value) else f"{value:.4g}"
 
 
-def document(ladder: Ladder, options: dict) -> dict:
+def document(ladder: Ladder, options: dict, intervals: Intervals | None = None) -> dict:
     """Everything to read the fit by program, and to repeat it. Angles in radians; what has no value is null."""
     source = ladder.measurement.source
     libraries = ("ggxref", "jax", "optimistix", "numpy")
@@ -130,7 +136,9 @@ def document(ladder: Ladder, options: dict) -> dict:
         "samples": ladder.problem.size,
         "notes": list(ladder.problem.notes),
         "chosen": ladder.chosen,
+        "warnings": identification.warnings(ladder),
         "models": [_model(ladder, fit) for fit in ladder.fits],
+        "bootstrap": intervals and {name: [_null(end) for end in ends] for name, ends in intervals.items()},
     }
 
 
@@ -143,21 +151,33 @@ def _model(ladder: Ladder, fit: Fit) -> dict:
         "starts": {"agreeing": fit.agreeing[0], "of": fit.agreeing[1]},
         "free": fit.space.size,
         "parameters": {
-            name: {"value": _null(value), "standard_error": _null(error), "free": free}
+            name: {
+                "value": _null(value),
+                "standard_error": _null(error),
+                "interval": [_null(end) for end in fit.intervals["alpha_x" if name == "alpha" else name]],
+                "free": free,
+            }
             for name, value, error, free in rows(fit)
         },
-        "A": [[_null(entry) for entry in row] for row in models.shape_matrix(fit.theta).tolist()],
+        "A": shape_matrix(fit),
         "theta": {
             "names": list(ladder.problem.parameters),
             "values": [_null(value) for value in fit.theta.tolist()],
             "free": fit.space.moved.tolist(),
             "covariance": fit.covariance.tolist(),
+            "correlation": fit.correlation.tolist(),
+            "at_bound": list(fit.at_bound),
         },
         "loss": fit.loss,
         "log_rmse": _null(fit.log_rmse),
         "held_out": {"folds": fit.held_out.tolist(), "above_best": above, "standard_error": error},
         "bic": fit.bic,
     }
+
+
+def shape_matrix(fit: Fit) -> list[list[float | None]]:
+    with solver.float64():
+        return [[_null(entry) for entry in row] for row in models.shape_matrix(fit.theta).tolist()]
 
 
 def _null(value: float) -> float | None:

@@ -1,0 +1,46 @@
+"""Bootstrap intervals: the chosen model fitted again to blocks drawn with replacement, so that what is correlated stays together."""
+
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+
+from ggxref.fit import levenberg, objectives, parameters, rows, solver
+from ggxref.fit.fitting import Fit, Ladder
+
+SEED = 1
+SETTLED = 0.05
+"""Standard errors that may be left to a replicate's minimum: nothing beside the spread of the replicates."""
+MOST_STEPS = 30
+
+
+def intervals(ladder: Ladder, replicates: int, share: float = 0.95) -> dict[str, tuple[float, float]]:
+    """The central `share` of each parameter and of what follows from them, by name."""
+    problem, fit = ladder.problem, ladder.best
+    blocks, block = np.unique(problem.block, return_inverse=True)
+    draws = np.random.default_rng(SEED).integers(len(blocks), size=(replicates, len(blocks)))
+    weights = np.stack([problem.weights * np.bincount(draw, minlength=len(blocks))[block] for draw in draws])
+    found = _reflectance(ladder, fit, weights) if problem.surface else _slopes(ladder, fit, weights)
+    zero = np.zeros((len(fit.theta),) * 2)
+    values = [parameters.report(theta, zero, problem.parameters)[0] for theta in found]
+    ends = (1 - share) / 2, (1 + share) / 2
+    return {name: tuple(np.quantile([each[name] for each in values], ends).tolist()) for name in fit.values}
+
+
+def _reflectance(ladder: Ladder, fit: Fit, weights: np.ndarray) -> np.ndarray:
+    surface = ladder.problem.surface
+    assert surface is not None
+    cut = rows.cut(ladder.problem)
+    padded = np.where(cut.index >= 0, weights[:, cut.index], 0.0)
+    lanes = rows.Lanes(replace(surface, tail=fit.tail), cut, [np.arange(len(cut.index))] * len(weights), list(padded))
+    start = np.tile(fit.theta, (len(weights), 1))
+    bases = np.tile(fit.identified.basis, (len(weights), 1, 1))
+    return levenberg.minimise(lanes.terms, start, bases, lanes.samples, settled=SETTLED, most=MOST_STEPS).theta
+
+
+def _slopes(ladder: Ladder, fit: Fit, weights: np.ndarray) -> np.ndarray:
+    loss = objectives.slopes(fit.tail)
+    with solver.float64():
+        samples = tuple(jnp.asarray(array) for array in ladder.problem.samples)
+        starts = np.tile(fit.theta, (len(weights), 1))
+        return np.asarray(solver.minimise(loss, samples, fit.space, starts, list(weights)).theta)
