@@ -209,7 +209,7 @@ def direction(x: Scalar, y: Scalar, z: Scalar) -> Vec3:
 
 
 @widened
-def azimuth(x: Scalar, y: Scalar, pole: tuple[float, float] = (1.0, 0.0)) -> tuple[Scalar, Scalar]:
+def azimuth(x: Scalar, y: Scalar, pole: tuple[Real, Real] = (1.0, 0.0)) -> tuple[Scalar, Scalar]:
     """Cosine and sine of the azimuth of `(x, y)`; `pole` at the origin, where there is none."""
     square = x * x + y * y
     scale = 1 / jnp.sqrt(jnp.where(square > 0, square, 1))

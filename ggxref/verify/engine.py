@@ -232,5 +232,6 @@ def worst(errors) -> float:
 
 
 def relative(got, expected) -> float:
-    """Largest relative error."""
-    return worst(np.asarray(got) / np.asarray(expected) - 1)
+    """Largest relative error; infinite where 0 is expected of what is not."""
+    with np.errstate(divide="ignore"):
+        return worst(np.asarray(got) / np.asarray(expected) - 1)

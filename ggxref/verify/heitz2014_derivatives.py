@@ -1,11 +1,11 @@
 """Heitz & d'Eon 2014 by differentiation: slopes as a change of variables, shape invariance, the operators by Fermat's principle."""
 
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ggxref.verify import cases, engine
 from ggxref.verify.batch import Batched
@@ -28,7 +28,7 @@ PATH = Batched(path, (1, 1, 1, 0, 0))
 ORIGIN = np.zeros(3)
 
 
-def detour(wi, wo, m, n_i: ArrayLike = 1.0, n_o: ArrayLike = 1.0):
+def detour(wi, wo, m, n_i: Any = 1.0, n_o: Any = 1.0):
     """Change of the path's length as the point of incidence moves in the plane of m, and the length of wo less 1."""
     return max(worst(np.cross(PATH.derivative(0)(ORIGIN, wi, wo, n_i, n_o), m)), worst(np.linalg.norm(wo, axis=-1) - 1))
 
