@@ -11,8 +11,8 @@ CLEAR = 2.0
 """Standard errors by which a difference must exceed 0 to be seen."""
 TIED = 0.95
 """Correlation from which two parameters are told apart badly."""
-FITS = math.log(1.5)
-"""Median |log(f̂/f)| from which a model does not describe a measurement: half of the values are off by half or more."""
+FITS = math.log(2)
+"""Log-RMSE from which a model does not describe a measurement: it is off by a factor of 2 or more."""
 END = {"f0": "0 or 1", "diffuse": "0", "gamma": "infinity, Beckmann's tail, or 3/2", "eta": "its end", "k": "its end"}
 
 
@@ -25,10 +25,11 @@ def warnings(ladder: Ladder) -> list[str]:
 def _misfit(ladder: Ladder, fit: Fit) -> list[str]:
     if not isinstance(ladder.measurement, Reflectance):
         return []
-    middle = float(np.nanmedian(fit.residuals))
-    if middle < FITS:
+    if fit.log_rmse < FITS:
         return []
-    return [f"no model here fits: half of the values are off by a factor of {math.exp(middle):.3g} or more"]
+    return [
+        f"no model here fits: the values are off by a factor of {math.exp(fit.log_rmse):.3g}, root mean square of the logarithm"
+    ]
 
 
 def _rotation(fit: Fit) -> list[str]:

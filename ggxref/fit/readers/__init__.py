@@ -29,12 +29,15 @@ def read(path: Path | str, *, pixel: tuple[float, float] | None = None) -> Refle
 
     - `pixel`: (dx, dy) in metres, for height fields whose format does not say it.
     """
-    path = Path(path)
-    content = _bytes(path)
-    for name, recognise, parse in FORMATS:
+    return parse(_bytes(Path(path)), str(path), pixel)
+
+
+def parse(content: bytes, path: str, pixel: tuple[float, float] | None = None) -> Reflectance | Heights:
+    """The measurement in these bytes, read from `path`."""
+    for name, recognise, reader in FORMATS:
         if recognise(content):
-            source = Source(str(path), name, hashlib.sha256(content).hexdigest())
-            return parse(content, source, pixel) if parse in (array.parse, matrix.parse) else parse(content, source)
+            source = Source(path, name, hashlib.sha256(content).hexdigest())
+            return reader(content, source, pixel) if reader in (array.parse, matrix.parse) else reader(content, source)
     names = ", ".join(name for name, _, _ in FORMATS)
     raise InputError(f"{path}: no measurement known here; it starts with {content[:24]!r}; known formats: {names}")
 

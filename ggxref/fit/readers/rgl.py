@@ -36,12 +36,12 @@ def parse(content: bytes, source: Source) -> Reflectance:
         if name not in fields or fields[name].ndim != dimensions or not fields[name].size:
             got = f"has shape {fields[name].shape}" if name in fields else "is missing"
             raise InputError(f"{source.path}: field {name!r} {got}; need {dimensions} dimensions")
-    tables = {name: np.asarray(fields[name], dtype=np.float64) for name in NEEDED}
+    tables = _checked(fields, source.path)
     azimuths, zeniths, grid = len(tables["phi_i"]), len(tables["theta_i"]), tables["rgb"].shape[3:]
-    for name, lead in (("vndf", (azimuths, zeniths)), ("rgb", (azimuths, zeniths))):
-        if tables[name].shape[:2] != lead or not np.isfinite(tables[name]).all():
+    for name in ("vndf", "rgb"):
+        if tables[name].shape[:2] != (azimuths, zeniths):
             raise InputError(
-                f"{source.path}: field {name!r} of shape {tables[name].shape} does not fit {lead} directions, or is not finite"
+                f"{source.path}: field {name!r} of shape {tables[name].shape} does not fit {azimuths} x {zeniths} directions"
             )
     parts = [_lobe(tables, a, z, grid) for a in range(azimuths) for z in range(zeniths)]
     wi, wo, values = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -64,6 +64,32 @@ def parse(content: bytes, source: Source) -> Reflectance:
     )
 
 
+LARGEST = 1e30
+"""Of any value: the largest mirror's density has 1e10, and squares of what is larger overflow."""
+
+
+def _checked(fields: dict[str, np.ndarray], path: str) -> dict[str, np.ndarray]:
+    """The needed fields in float64, each within what it can mean."""
+    with np.errstate(all="ignore"):
+        tables = {name: np.asarray(fields[name]).astype(np.float64) for name in NEEDED}
+    limits = {
+        "theta_i": (0, math.pi / 2 + 1e-4),
+        "phi_i": (-7, 7),
+        "rgb": (-LARGEST, LARGEST),
+        "sigma": (1e-6, LARGEST),
+    }
+    for name, table in tables.items():
+        low, high = limits.get(name, (0, LARGEST))
+        if not ((table >= low) & (table <= high)).all():
+            bad = table[~((table >= low) & (table <= high))][0]
+            raise InputError(
+                f"{path}: field {name!r} holds {bad:g}, which is not finite or not from {low:g} to {high:g}"
+            )
+        if name in ("ndf", "sigma", "vndf") and min(table.shape[-2:]) < 2:
+            raise InputError(f"{path}: field {name!r} has shape {table.shape}; need 2 or more nodes an axis")
+    return tables
+
+
 class _Axis(NamedTuple):
     """Where points lie in a grid of nodes at 0, 1/(n − 1), …, 1: the cell, and the fraction of it."""
 
@@ -84,7 +110,8 @@ def read_fields(content: bytes, path: str) -> dict[str, np.ndarray]:
             )
         shape, dtype = stream.take(f"<{dimensions}Q"), TYPES[code]
         size = math.prod(shape)
-        if offset + size * dtype.itemsize > len(content):
+        # A size of 0 would let the others be anything.
+        if offset + size * dtype.itemsize > len(content) or max(shape, default=0) > len(content):
             raise InputError(f"{path}: field {name!r} of shape {shape} ends beyond the file's {len(content)} bytes")
         fields[name] = np.frombuffer(content, dtype, size, offset).reshape(shape)
     return fields
