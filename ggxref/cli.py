@@ -60,6 +60,16 @@ def verify(
     equation: Annotated[str | None, typer.Option(metavar="N", help="Only those of this equation or place.")] = None,
     samples: Annotated[int, typer.Option(help="Random numbers per case of a statistical check.", min=1 << 12)] = 1
     << 16,
+    thorough: Annotated[
+        bool,
+        typer.Option("--thorough", help="Eight times the samples, and normalisations by tens of millions of them."),
+    ] = False,
+    distributed: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOST:PORT,COUNT,RANK", help="This is process RANK of COUNT; process 0 listens at HOST:PORT."
+        ),
+    ] = None,
     mutants: Annotated[
         bool,
         typer.Option("--mutants", help="Put wrong formulas in the library's place and show which check kills each."),
@@ -70,6 +80,11 @@ def verify(
     json: Annotated[Path | None, typer.Option(metavar="PATH", help="Write the records and errata here too.")] = None,
 ) -> None:
     """Prove the formulas numerically, each beside a wrong one that must fail."""
+    from ggxref.verify import distributed as processes
+
+    processes.use_all_cores()
+    if distributed:
+        processes.join(distributed)
     from ggxref.verify import engine, errata, report
     from ggxref.verify import pages as write
 
@@ -77,32 +92,37 @@ def verify(
         raise InputError(f"--json: {json} cannot be written: there is no directory {json.parent}")
     if pages and not pages.is_dir():
         raise InputError(f"--pages: there is no directory {pages}")
-    checks = engine.select(engine.registered(), paper, equation)
     if (paper or equation) and (mutants or pages):
         raise InputError(f"{'--mutants' if mutants else '--pages'}: takes all checks; leave out --paper and --equation")
     if mutants:
-        return _hunt(checks, samples, json)
+        return _hunt(samples, json)
+    checks = engine.select(engine.registered(thorough), paper, equation)
+    samples = 8 * samples if thorough else samples
+    together = [c for c in checks if c.thorough]
     start, records = perf_counter(), []
-    with _progress("checks", len(checks)) as advance:
-        for record in engine.run(checks, samples):
-            records.append(record)
-            advance(1)
+    with _progress("checks", len(own := processes.share(checks)) + len(together)) as advance:
+        for each, threads in ((own, 2), (together, 1)):
+            for record in engine.run(each, samples, threads):
+                records.append(record)
+                advance(1)
+    records = processes.gathered(records, checks)
     seconds = perf_counter() - start
-    report.show(records, seconds)
-    if json:
-        write_atomically(json, report.document(records, errata.found(records), seconds))
+    if processes.first():
+        report.show(records, seconds)
+        if json:
+            write_atomically(json, report.document(records, errata.found(records), seconds))
     if not all(r.good for r in records):
         raise typer.Exit(1)
-    if pages:
-        write_atomically(pages / "equations.md", write.equations(checks))
+    if pages and processes.first():
+        write_atomically(pages / "equations.md", write.equations(engine.registered()))
         write_atomically(pages / "errata.md", write.misprints(records))
 
 
-def _hunt(checks: list, samples: int, json: Path | None) -> None:
+def _hunt(samples: int, json: Path | None) -> None:
     """Put each mutant in the library's place; exit code 1 if one lives."""
-    from ggxref.verify import mutants, report
+    from ggxref.verify import engine, mutants, report
 
-    start, verdicts = perf_counter(), []
+    start, verdicts, checks = perf_counter(), [], engine.registered()
     with _progress("mutants", len(mutants.MUTANTS)) as advance:
         for each in mutants.MUTANTS:
             verdicts.append(mutants.hunt(each, checks, samples))

@@ -47,7 +47,7 @@ def linear(wm: Vec3, M: Mat3) -> Scalar:
 
     - `wm`: unit, (3,); `M`: (3, 3), non-singular.
 
-    dupuy2023 (1), tokuyoshi2024 (which leaves out the vector that the determinant's power divides).
+    dupuy2023 (1), tokuyoshi2024 (18).
     """
     image = length(*times(M, *wm))
     return jnp.abs(cofactor(M)[1]) / (image * image * image)

@@ -41,6 +41,7 @@ CHECKS = (
     "ours_energy",
     "ours_integrals",
     "misprints",
+    "streamed",
 )
 METHODS = ("exact", "certified", "quadrature", "autodiff", "monte_carlo")
 SAMPLES = 1 << 16
@@ -50,6 +51,7 @@ class Stream:
     """Independent uniform numbers for one check: seeded by its name, so neither order nor selection changes them."""
 
     def __init__(self, name: str, samples: int):
+        self.name = name
         self.samples = samples
         self._generator = np.random.default_rng(zlib.crc32(name.encode()))
 
@@ -101,6 +103,7 @@ class Check:
     body: Callable
     settings: dict = field(default_factory=dict)
     also: tuple[tuple[str, str], ...] = ()
+    thorough: bool = False
 
     @property
     def places(self) -> list[tuple[str, str]]:
@@ -162,6 +165,7 @@ def check(
     tolerance: float | int,
     mutant: tuple[str, Callable],
     also: Sequence[str] = (),
+    thorough: bool = False,
     **settings,
 ):
     """Register the decorated body as a check; it may be decorated several times, once for each formula it tests.
@@ -169,6 +173,7 @@ def check(
     - `functions`: what the body is called with: a public name below `ggxref` (given batched, in float64) or a callable.
     - `mutant`: its name, and the change from the first function to a wrong one.
     - `also`: other places that state what is tested, "(7)" of the same document or "walter2014 (7)" of another.
+    - `thorough`: one that takes long, and all processes together; it is left out unless asked for.
     - `settings`: further keyword arguments of the body; method "monte_carlo" adds `stream`.
 
     The body returns the error, which must stay within `tolerance` for the formula and not for the mutant.
@@ -178,7 +183,18 @@ def check(
 
     def register(body):
         found = Check(
-            paper, equation, statement, method, names, float(tolerance), mutant[0], mutant[1], body, settings, others
+            paper,
+            equation,
+            statement,
+            method,
+            names,
+            float(tolerance),
+            mutant[0],
+            mutant[1],
+            body,
+            settings,
+            others,
+            thorough,
         )
         _register.append(found)
         return body
@@ -191,11 +207,13 @@ def _other_place(paper, place):
     return (first, rest) if first in PAPERS else (paper, place)
 
 
-def registered() -> list[Check]:
-    """Every check, in the order of the documents."""
+def registered(thorough: bool = False) -> list[Check]:
+    """Every check, in the order of the documents; those that take long if they are asked for."""
     for name in CHECKS:
         import_module(f"ggxref.verify.{name}")
-    return sorted(_register, key=lambda c: (PAPERS.index(c.paper), _place(c.equation)))
+    return sorted(
+        (c for c in _register if thorough or not c.thorough), key=lambda c: (PAPERS.index(c.paper), _place(c.equation))
+    )
 
 
 def _place(equation):
