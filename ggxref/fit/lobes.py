@@ -105,20 +105,31 @@ class _Folds(NamedTuple):
     bread: np.ndarray
 
 
+MOST_BLOCKS = 128
+"""With more, no block pulls hard, and the plain sandwich over them will do."""
+
+
 def _curvature(bank: Bank, surface, k: int, theta: np.ndarray, space: Space) -> tuple[Curvature, _Folds]:
-    problem, which = bank.problems[k], bank.of[k]
-    found = _join(rows.each(surface, np.tile(theta, (len(which), 1)), bank.all, which, bank.all.weights[which]))
-    index = bank.all.index[which]
+    problem = bank.problems[k]
     columns = space.basis[:, space.columns]
-    scores = np.stack([np.bincount(problem.block[index[index >= 0]], column) for column in
-                       (columns.T @ found.scores.swapaxes(0, 1)[:, index >= 0])], axis=1) if space.size else \
-             np.zeros((problem.block.max() + 1, 0))  # fmt: skip
-    fold = bank.all.fold[which]
-    sums = [
-        np.stack([part[fold == f].sum(axis=0) for f in range(fold.max() + 1)])
-        for part in (found.scores.sum(axis=-1), found.bread)
-    ]
-    return Curvature(columns.T @ found.bread.sum(axis=0) @ columns, scores), _Folds(*sums)
+    few = len(np.unique(problem.block)) <= MOST_BLOCKS
+    cut, block = rows.cut_by_block(problem) if few else (rows.cut(problem), np.zeros(0, int))
+    which = np.arange(len(cut.index))
+    found = _join(rows.each(surface, np.tile(theta, (len(which), 1)), cut, which, cut.weights))
+    gradient = found.scores.sum(axis=-1)
+    if few:
+        numbers = np.unique(block)
+        scores = np.stack([gradient[block == b].sum(axis=0) for b in numbers]) @ columns
+        parts = np.stack([columns.T @ found.bread[block == b].sum(axis=0) @ columns for b in numbers])
+        # All of a block is in one fold.
+        fold = problem.fold[cut.index[:, 0]]
+    else:
+        inside = cut.index >= 0
+        each = columns.T @ found.scores.swapaxes(0, 1)[:, inside]
+        scores = np.stack([np.bincount(problem.block[cut.index[inside]], row) for row in each], axis=1)
+        parts, fold = None, cut.fold
+    sums = [np.stack([part[fold == f].sum(axis=0) for f in range(fold.max() + 1)]) for part in (gradient, found.bread)]
+    return Curvature(columns.T @ found.bread.sum(axis=0) @ columns, scores, parts), _Folds(*sums)
 
 
 def _join(pieces: list[Each]) -> Each:

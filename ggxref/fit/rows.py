@@ -44,6 +44,13 @@ def cut(problem: Problem, kept: np.ndarray | None = None) -> Rows:
     return Rows(samples, weights, index, np.repeat(np.arange(len(padded)), [len(rows) for rows in padded]))
 
 
+def cut_by_block(problem: Problem) -> tuple[Rows, np.ndarray]:
+    """The problem's samples in rows of which none straddles two blocks, and each row's block."""
+    blocks = np.unique(problem.block)
+    several = [cut(problem, np.flatnonzero(problem.block == block)) for block in blocks]
+    return join(several), np.repeat(blocks, [len(each.weights) for each in several])
+
+
 def join(several: list[Rows]) -> Rows:
     return Rows(
         tuple(np.concatenate(arrays) for arrays in zip(*(rows.samples for rows in several), strict=True)),

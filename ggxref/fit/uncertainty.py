@@ -18,10 +18,13 @@ STEP = 1e-3
 
 
 class Curvature(NamedTuple):
-    """In the free y, of the summed losses: `hessian` (k, k), and `scores`, each block's gradient (blocks, k)."""
+    """In the free y, of the summed losses: `hessian` (k, k), `scores`, each block's gradient (blocks, k), and where they are
+    known the blocks' own Hessians, `parts` (blocks, k, k).
+    """
 
     hessian: np.ndarray
     scores: np.ndarray
+    parts: np.ndarray | None = None
 
 
 def curvature(by_block: Callable[[np.ndarray], np.ndarray], theta: np.ndarray, space: Space) -> Curvature:
@@ -69,10 +72,24 @@ def spread(at: Curvature, space: Space) -> Spread:
     groups = np.count_nonzero(at.scores.any(axis=1))
     # The gradient at the minimum is 0, so that one block's score is minus the others': hence groups - 1.
     meat = at.scores.T @ at.scores * groups / max(groups - 1, 1)
-    covariance = inverse @ meat @ inverse
+    covariance = inverse @ meat @ inverse if at.parts is None else _jackknife(at, at.parts)
     errors = np.sqrt(np.diag(covariance))
     step = np.abs(inverse @ at.scores.sum(axis=0)) / np.where(errors > 0, errors, 1.0)
     columns = space.basis[:, space.columns]
     flat = eigenvalues[0] <= SINGULAR * eigenvalues[-1]
     valley = np.abs(columns) @ np.abs(vectors[:, 0]) if flat else np.zeros(len(columns))
     return Spread(columns @ covariance @ columns.T, float(step.max()), valley)
+
+
+def _jackknife(at: Curvature, parts: np.ndarray) -> np.ndarray:
+    """The sandwich whose scores are those of a fit without their own block: a block that pulls hard hides its own error.
+
+    With θ₋ the minimum without a block, to one Newton step: Σ (θ₋ − θ)(θ₋ − θ)ᵀ (G − 1)/G over the G blocks.
+    """
+    moves = np.stack(
+        [
+            np.linalg.pinv(at.hessian - part, rcond=SINGULAR, hermitian=True) @ g
+            for part, g in zip(parts, at.scores, strict=True)
+        ]
+    )
+    return moves.T @ moves * (len(moves) - 1) / len(moves)
