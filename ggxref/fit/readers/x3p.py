@@ -30,7 +30,7 @@ def parse(content: bytes, source: Source) -> Heights:
     try:
         archive = zipfile.ZipFile(io.BytesIO(content))
     except BROKEN as error:
-        raise InputError(f"{path}: a broken or truncated zip: {error}") from error
+        raise InputError(f"{path}: a broken or truncated zip: {str(error)[:200]}") from error
     with archive:
         main = _find(archive, "main.xml", path)
         fields = _fields(_read(archive, main, LARGEST_XML, path), path)
@@ -68,7 +68,7 @@ def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo, largest: int, path:
         with archive.open(member) as stream:
             data = stream.read(size + 1)
     except BROKEN as error:
-        raise InputError(f"{path}: {member.filename} cannot be unpacked: {error}") from error
+        raise InputError(f"{path}: {member.filename} cannot be unpacked: {str(error)[:200]}") from error
     if len(data) != size:
         raise InputError(f"{path}: {member.filename} unpacks to {len(data)} bytes, not the {size} it claims")
     return data
