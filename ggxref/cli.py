@@ -313,7 +313,7 @@ def grade(
     if sum(map(bool, (python or mapping, command, answers))) != 1:
         raise InputError("wanted one of --python (or --map), --command and --answers")
     order = generate.order(functions, dtypes, None, 1)
-    tests = grading.selected(reading.read(directory or reading.SHIPPED), order, test)
+    tests = grading.selected(reading.read(directory or reading.SHIPPED, order.functions), order, test)
     if command:
         result = grading.of_program(command, tests, timeout, strict)
     elif answers:

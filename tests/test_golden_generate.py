@@ -47,7 +47,7 @@ def test_one_process_and_two_write_the_same_bytes(tmp_path):
 def test_these_bytes_are_the_ones_of_every_machine_and_python(tmp_path):
     """Pinned: if they change on purpose, raise generate.VERSION and make the shipped vectors anew."""
     manifest = generate.generate(SMALL, tmp_path / "v")
-    assert manifest["tests_sha256"][:16] == "47e88e7017dd60cb"
+    assert manifest["tests_sha256"][:16] == "7423ae818b30db98"
 
 
 def test_another_seed_draws_other_tests(tmp_path):

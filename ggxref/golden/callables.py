@@ -68,7 +68,7 @@ def implementation(module: str, mapping: Path | None, jax: bool) -> Implementati
             raise InputError(f"{mapping}: not JSON: {error}") from None
         if not isinstance(names, dict) or not all(isinstance(v, str) and ":" in v for v in names.values()):
             raise InputError(f'{mapping}: wanted {{"ndf.ggx": "module:function", …}}')
-    for name in [module, *(value.partition(":")[0] for value in names.values())]:
+    for name in [*([module] if module else []), *(value.partition(":")[0] for value in names.values())]:
         try:
             importlib.import_module(name)
         except Exception as error:  # a module may fail in any way while it is imported

@@ -16,7 +16,9 @@ from ggxref.golden.rounding import decode, encode, ends
 from ggxref.golden.verdict import Verdict, judge
 
 # Enough to tell the mutants apart, few enough to answer at once.
-MOST_FAILURES, MOST_PASSES = 60, 30
+MOST_FAILURES, MOST_PASSES = 40, 20
+# Of so many failures a mutant must explain so many to be looked at closely.
+FIRST_LOOK, LEAST_FIRST = 8, 2
 # A mutant is named if it explains at least this share of the failures and of its own.
 LEAST_SHARE = Fraction(1, 2)
 
@@ -33,8 +35,8 @@ class Diagnosis:
 
 def prediction(mutant: Mutant, test: Test) -> Any:
     """The mutant's answer to a test as bits; None where it has none."""
-    values = {a: mapped(lambda b: decode(b, test.fmt), x) for a, x in test.inputs.items()}
     try:
+        values = {a: mapped(lambda b: decode(b, test.fmt), x) for a, x in test.inputs.items()}
         result = mutant.answer(test.function, values)
         return None if result is None else mapped(lambda ball: rounded(ball, test), result)
     except (ArithmeticError, ValueError):
@@ -82,11 +84,14 @@ def diagnose(verdicts: Sequence[Verdict]) -> Diagnosis | None:
     right = spread_out([v for v in valid if v.passed], MOST_PASSES)
     if not wrong:
         return None
-    scores = [(*share(m, wrong, right), -i) for i, m in enumerate(MUTANTS)]
-    best, explained, place = max(scores)
-    if best < LEAST_SHARE:
+    first = spread_out(wrong, FIRST_LOOK)
+    likely = [m for m in MUTANTS if share(m, first, [])[1] >= min(LEAST_FIRST, len(first))]
+    # Of equals the first: `max` keeps it.
+    scores = [(*share(m, wrong, right), m) for m in likely]
+    best, explained, mutant = max(scores, key=lambda s: s[:2], default=(Fraction(0), 0, None))
+    if mutant is None or best < LEAST_SHARE:
         return None
-    return Diagnosis(verdicts[0].test.function.id, MUTANTS[-place], explained, len(wrong))
+    return Diagnosis(verdicts[0].test.function.id, mutant, explained, len(wrong))
 
 
 def measurable(v: Verdict) -> bool:

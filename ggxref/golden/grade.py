@@ -1,7 +1,9 @@
 """Grading: all verdicts on an implementation, summed up by function, dtype and flag."""
 
+import os
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -100,11 +102,14 @@ def of_python(
     implementation: callables.Implementation, tests: list[Test], strict: bool, advance: Callable[[int], None]
 ) -> Grade:
     answers: text.Answers = {}
-    for function, fmt, group in text.groups(tests):
-        given = callables.ask(implementation, group)
-        for test, answer in zip(group, given or [], strict=given is not None):
-            answers[function.id, fmt.name, test.id] = fitting(answer, test, text.like(group))
-        advance(len(group))
+    groups = list(text.groups(tests))
+    # Compiling lets other threads run; a plain Python function would only wait for them.
+    with ThreadPoolExecutor(os.cpu_count() if implementation.jax else 1) as pool:
+        asked = pool.map(lambda g: callables.ask(implementation, g[2]), groups)
+        for (function, fmt, group), given in zip(groups, asked, strict=True):
+            for test, answer in zip(group, given or [], strict=given is not None):
+                answers[function.id, fmt.name, test.id] = fitting(answer, test, text.like(group))
+            advance(len(group))
     return collect(tests, answers, strict)
 
 

@@ -97,11 +97,12 @@ def rotation(s: Stream) -> Matrix:
 
 
 def general(s: Stream, A: Matrix, variant: str) -> Matrix:
-    """Another matrix of the same distribution, Q A; for `negative` one with a negative determinant."""
+    """Another matrix of the same distribution, c Q A; for `negative` one with a negative determinant."""
     if variant == "aligned":
         return A
-    Q = rotation(s)
-    return product((Q[0], Q[1], minus(Q[2])) if variant == "negative" else Q, A)
+    Q, c = rotation(s), s.scale(Fraction(1, 2), 2)
+    x, y, z = product((Q[0], Q[1], minus(Q[2])) if variant == "negative" else Q, A)
+    return combination(c, x, ZERO, x), combination(c, y, ZERO, y), combination(c, z, ZERO, z)
 
 
 def micronormal(s: Stream, fmt: Format, A: Matrix, wi: Vector, variant: str) -> Vector:

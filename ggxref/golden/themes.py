@@ -54,6 +54,7 @@ THEMES: list[Theme] = [
     {"wi": "grazing", "alpha": "small"},
     {"wi": "grazing", "alpha": "above one"},
     {"wi": "near", "alpha": "small"},
+    {"wm": "normal", "alpha": "small"},
     {"wi": "grazing", "A": "strong"},
     {"wi": "below", "A": "skew"},
     {"wo": "mirror"},

@@ -85,6 +85,10 @@ def tangential(test: Test, answer: Any) -> Any:
     fmt, argument = test.fmt, test.function.derivative
     if not argument or test.function.arguments[argument] != "wm" or len(answer) != 4:
         return answer
+    x, y, _ = test.inputs[argument]
+    if {x, y} <= {0, fmt.sign} and not is_nan(answer[3], fmt):
+        # At the normal that part is z alone, and may be beyond the dtype.
+        return (*answer[:3], 0)
     if any(b & (fmt.sign - 1) >= fmt.infinity for b in (*answer, *test.inputs[argument])):
         return answer
     m, g = ((decode(x, fmt), decode(y, fmt), decode(z, fmt)) for x, y, z in (test.inputs[argument], answer[1:]))
