@@ -4,17 +4,23 @@ import math
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ggxref.fit import fit, read
+from ggxref.fit.readers import rgl
 
 DATA = Path(os.environ.get("GGXREF_DATA", "no folder named"))
 
 
-def ladder(name, **options):
+def file(name):
     if not (DATA / name).exists():
         pytest.skip(f"measured data not here: set GGXREF_DATA to the folder that holds {name}")
-    return fit(read(DATA / name), **options)
+    return DATA / name
+
+
+def ladder(name, **options):
+    return fit(read(file(name)), **options)
 
 
 def by_model(ladder):
@@ -65,3 +71,34 @@ def test_starlink(name):
     found = ladder(name)
     assert not found.best.trouble
     assert found.measurement.counts == {"left out: on the horizon": 8}
+
+
+def projected(table):
+    """The integrand over u of ∫ D cosθ dω, with θ = u² π/2, of an RGL table of D; and u. The last of the even azimuths is the first."""
+    u = np.linspace(0, 1, table.shape[1])
+    theta = u * u * math.pi / 2
+    return table[:-1].mean(axis=0) * np.cos(theta) * np.sin(theta) * 2 * math.pi * math.pi * u, u
+
+
+RGL = ("cc_ibiza_sunset", "chm_mint", "chm_orange", "colodur_napoli_4f", "ilm_solo_m_68", "irid_flake_paint1",
+       "paper_white", "satin_rosaline", "vch_golden_yellow")  # fmt: skip
+
+
+@pytest.fixture(params=RGL)
+def density(request):
+    path = file(f"rgl/{request.param}_rgb.bsdf")
+    return np.asarray(rgl.read_fields(path.read_bytes(), str(path))["ndf"], float)
+
+
+def test_the_tables_normalise(density):
+    """The files' makers made the *mean* over the 128 nodes 1, to float32's digits; the trapezoid integral is 128/127 of it."""
+    integrand, u = projected(density)
+    assert integrand.mean() == pytest.approx(1, abs=1e-7)
+    assert np.trapezoid(integrand, u) == pytest.approx(128 / 127, abs=1e-7)
+
+
+def test_the_tables_do_not_normalise_over_another_axis(density):
+    """With nodes even in θ, and not in its root, the same table must miss 1."""
+    theta = np.linspace(0, math.pi / 2, density.shape[1])
+    area = np.trapezoid(density[0] * np.cos(theta) * np.sin(theta) * 2 * math.pi, theta)
+    assert abs(area - 1) > 0.5

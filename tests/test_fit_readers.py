@@ -305,6 +305,11 @@ class TestAstm:
         assert data.counts == {"left out: on the horizon": 1}
 
     def test_degrees_are_noticed(self, tmp_path):
+        head, rows = self.TEXT[: self.TEXT.index("0.5236")], fit_data.table(DEGREES, VALUES, "").replace(" ", ",")
+        with pytest.raises(InputError, match=r"zeniths up to 85 and azimuths up to 180: these look like degrees"):
+            read(fit_data.write(tmp_path / "a", head.replace(",nir", "") + rows))
+
+    def test_one_zenith_beyond_a_right_angle_is_a_bad_line(self, tmp_path):
         with pytest.raises(
             InputError, match=r"line 15: zenith_o = 30 is below the horizon; need -1.571 to 1.571 radians"
         ):

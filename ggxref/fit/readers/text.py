@@ -97,6 +97,7 @@ def _check_values(values: np.ndarray, names: list[str], lines: list[int], path: 
 
 
 def _check_angles(angles: np.ndarray, unit: float, lines: list[int], path: str) -> None:
+    _check_unit(np.abs(angles), unit, path)
     name_of_unit = "radians" if unit == 1 else "degrees"
     for column, name in enumerate(ANGLES):
         angle = angles[:, column]
@@ -108,9 +109,16 @@ def _check_angles(angles: np.ndarray, unit: float, lines: list[int], path: str) 
             raise InputError(
                 f"{path} line {lines[row]}: {name} = {angle[row]:g} {why}; need -{limit / unit:.4g} to {limit / unit:.4g} {name_of_unit}"
             )
+
+
+def _check_unit(sizes: np.ndarray, unit: float, path: str) -> None:
+    """That the angles, `sizes` without their signs, are not in the other unit."""
+    zenith, azimuth = sizes[:, ::2].max(), sizes[:, 1::2].max()
+    said = f"{path}: zeniths up to {zenith:.4g} and azimuths up to {azimuth:.4g}"
     # Radians pass every range of degrees; but no goniometer keeps its zeniths under 1.6 and its azimuths under 6.3 degrees.
-    zenith, azimuth = np.abs(angles[:, ::2]).max(), np.abs(angles[:, 1::2]).max()
     if unit != 1 and zenith <= math.pi / 2 + 1e-3 and azimuth <= 2 * math.pi + 1e-3:
-        raise InputError(
-            f"{path}: no zenith above {zenith:.4g} and no azimuth above {azimuth:.4g}: these look like radians; need degrees"
-        )
+        raise InputError(f"{said}: these look like radians; need degrees")
+    # A single angle beyond the range of radians is a bad line; half the zeniths beyond it are another unit.
+    beyond = np.count_nonzero(sizes[:, ::2].max(axis=1) > math.pi / 2 + 1e-3)
+    if unit == 1 and 2 * beyond >= len(sizes) and zenith <= 90 and azimuth <= 360:
+        raise InputError(f"{said}: these look like degrees; need radians")
