@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from ggxref.cli import app
 from ggxref.golden import flags, grade, invalid, reading, text
 from ggxref.golden.cases import mapped
+from ggxref.golden.diagnose import prediction
 from ggxref.golden.mistakes import MUTANTS
 from ggxref.golden.reading import SHIPPED
 from ggxref.golden.rounding import FORMATS
@@ -76,6 +77,19 @@ def test_every_mutant_is_rejected_and_nine_of_ten_named():
     script = Path(__file__).parents[1] / "experiments" / "grade_mutants.py"
     done = subprocess.run([sys.executable, script], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_each_flag_kills_the_mutant_that_the_documentation_names():
+    page = (CLIENTS.parent / "vectors.md").read_text()
+    rows = re.findall(r"^\| (\w+) \| .* \| \d+ \| (\S+) \| (\S+) (\S+) (\d+) \|$", page, re.M)
+    # No mutant takes a NaN; the last test of this file is about those.
+    assert {flag for flag, *_ in rows} == (flags.SENTENCES.keys() | invalid.SENTENCES.keys()) - {"NotANumber"}
+    for flag, mutant, function, dtype, id in rows:
+        (test,) = (t for t in of(function, dtype) if t.id == int(id))
+        assert flag in test.flags
+        (predicted,) = (prediction(m, test) for m in MUTANTS if m.name == mutant)
+        assert predicted is not None
+        assert not judge(test, predicted).passed
 
 
 def test_the_command_names_the_mutant_and_another_order_of_summation_passes(tmp_path):

@@ -68,8 +68,9 @@ def share(mutant: Mutant, wrong: Sequence[Verdict], right: Sequence[Verdict]) ->
     explained = against = 0
     for v in wrong:
         predicted = prediction(mutant, v.test)
+        # A mutant that is right here explains nothing.
         if predicted is not None and v.got is not None and alike(v.got, predicted, v.test):
-            explained += 1
+            explained += not judge(v.test, predicted).passed
     if explained:
         for v in right:
             predicted = prediction(mutant, v.test)

@@ -90,6 +90,10 @@ def _signed(result: Any, function: Any, values: Any) -> Any:
     return -result if determinant(values[matrix]) < 0 else result
 
 
+def _cut(result: Any, *_: Any) -> Any:
+    return result if result > arb(10) ** -20 else arb(0)
+
+
 _PAIRS = (("ggx", "beckmann"), ("beckmann", "ggx"))
 _OTHER = {
     f"{a}{mine}": f"{a}{other}({arguments})"
@@ -173,6 +177,7 @@ MUTANTS: list[Mutant] = [
         "third_column", "the factor |A n| is missing", then(lambda r, f, v: r * third_column(v["A"]), "ndf.ellipsoid")
     ),
     Mutant("size_ignored", "the ellipsoid's size is taken for 1", on("size", lambda size: ONE)),
+    Mutant("tail_cut", "densities below 1e-20 are set to 0", then(_cut, "ndf. pdf")),
     Mutant("view_flipped", "a direction of light or view has the wrong sign", on("wi", minus)),
     Mutant("normal_flipped", "the micronormal has the wrong sign", on("wm", minus)),
     Mutant("below_as_above", "a direction below the horizon is taken for its mirror image above", on("wi", raised)),
