@@ -195,7 +195,9 @@ def fit(
         int, typer.Option(help="Intervals from this many replicates, and not from standard errors.", min=0)
     ] = 0,
     json: Annotated[Path | None, typer.Option(metavar="PATH", help="Write the fit here too.")] = None,
-    figure: Annotated[Path | None, typer.Option(metavar="PATH", help="Draw it: .pdf, .png or .svg.")] = None,
+    figure: Annotated[
+        Path | None, typer.Option(metavar="PATH", help="Draw it (.pdf, .png, .svg), -residuals, -sphere beside it.")
+    ] = None,
     export: Annotated[
         str | None, typer.Option(metavar="FORM", help="Print it as mitsuba, pbrt, gltf, materialx or json say it.")
     ] = None,

@@ -40,7 +40,11 @@ def one(file: Path, given: dict, pixel: tuple[float, float] | None, outputs: Out
     if outputs.json:
         write_atomically(outputs.json, dumps(report.document(ladder, given, intervals), indent=1) + "\n")
     if outputs.figure:
-        write_atomically(outputs.figure, figures.draw(ladder, outputs.figure.suffix))
+        drawn, missing = figures.draw(ladder, outputs.figure)
+        for path, content in drawn.items():
+            write_atomically(path, content)
+        if missing:
+            console.print(missing)
     if said:
         if said[1]:
             console.print(said[1], style="bold")

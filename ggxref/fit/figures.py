@@ -1,4 +1,4 @@
-"""Figures of a fit: lobes per incident direction, or the slope density with its contours. Fit for greyscale print."""
+"""Figures of a fit: lobes per incident direction, or the slope density with its contours, fit for greyscale print; and their companions."""
 
 import io
 import math
@@ -31,9 +31,20 @@ def check(path: Path) -> None:
         raise InputError(f"{path}: no figure format; need a name that ends in {', '.join(SUFFIXES)}")
 
 
-def draw(ladder: Ladder, suffix: str) -> bytes:
-    """The figure in the format of `suffix`."""
-    figure = _lobes(ladder) if isinstance(ladder.measurement, Reflectance) else _slopes(ladder)
+def draw(ladder: Ladder, path: Path) -> tuple[dict[Path, bytes], str]:
+    """What to write: the figure of that name, of reflectance with the residual map and the lit sphere beside it; and why one is missing."""
+    if not isinstance(ladder.measurement, Reflectance):
+        return {path: _encoded(_slopes(ladder), path.suffix)}, ""
+    from ggxref.fit import residual_map, sphere
+
+    drawn = {"": _lobes(ladder), "-residuals": residual_map.draw(ladder)}
+    missing = sphere.unseen(ladder)
+    if not missing:
+        drawn["-sphere"] = sphere.draw(ladder)
+    return {path.with_stem(path.stem + name): _encoded(each, path.suffix) for name, each in drawn.items()}, missing
+
+
+def _encoded(figure: Figure, suffix: str) -> bytes:
     stream = io.BytesIO()
     figure.savefig(stream, format=suffix.removeprefix(".").lower(), dpi=200)
     return stream.getvalue()
@@ -48,13 +59,8 @@ def shown(ladder: Ladder) -> list[Fit]:
 
 def _lobes(ladder: Ladder) -> Figure:
     (wi, wo, wm, measured, _), surface = ladder.problem.samples, ladder.problem.surface or Surface()
-    order = np.argsort(-wi[2], kind="stable")
-    directions, first = np.unique(np.round(wi.T[order], 6), axis=0, return_index=True)
-    directions = directions[np.argsort(first)][:MOST_PANELS]
-    columns = min(4, len(directions))
-    rows = math.ceil(len(directions) / columns)
-    figure = Figure(figsize=(7.0, 1.0 + 1.75 * rows), layout="constrained")
-    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    directions = incident(wi)
+    figure, panels = grid(len(directions), 1.75)
     handles = []
     for axes, direction in zip(panels, directions, strict=False):
         members = np.abs(wi.T - direction).max(axis=1) < 1e-5
@@ -62,16 +68,12 @@ def _lobes(ladder: Ladder) -> Figure:
         along = np.argsort(angle)
         handles = axes.plot(angle, measured[:, members].T, ".", ms=2, mew=0, color=MEASURED, label="measured")[:1]
         for fit, style in zip(shown(ladder), STYLES, strict=False):
-            model = _model(fit, surface, wi[:, members], wo[:, members], wm[:, members])
-            handles += axes.plot(angle[along], model[:, along].T, lw=1, label=fit.model.name, **style)[:1]
-        zenith = math.degrees(math.acos(min(direction[2], 1)))
-        axes.set_title(rf"$\theta_i = {zenith:.4g}°$", fontsize=8)
-        axes.axvline(zenith, color="0.8", lw=0.6, zorder=0)
+            values = model(fit, surface, wi[:, members], wo[:, members], wm[:, members])
+            handles += axes.plot(angle[along], values[:, along].T, lw=1, label=fit.model.name, **style)[:1]
+        axes.set_title(zenith_title(direction), fontsize=8)
+        axes.axvline(math.degrees(math.acos(min(direction[2], 1))), color="0.8", lw=0.6, zorder=0)
         axes.set(yscale="log", xlim=(-90, 90), xticks=[-90, -45, 0, 45, 90])
         axes.tick_params(labelsize=7)
-    for k in range(len(directions), len(panels)):
-        panels[k].set_visible(False)
-        panels[k - columns].tick_params(labelbottom=True)
     figure.supxlabel(r"outgoing zenith $\theta_o$ [degrees], positive on the mirror's side", fontsize=8)
     figure.supylabel("BRDF [1/sr]", fontsize=8)
     figure.legend(
@@ -80,7 +82,31 @@ def _lobes(ladder: Ladder) -> Figure:
     return figure
 
 
-def _model(fit: Fit, surface: Surface, wi: np.ndarray, wo: np.ndarray, wm: np.ndarray) -> np.ndarray:
+def incident(wi: np.ndarray) -> np.ndarray:
+    """The incident directions (k, 3) that have a panel, of `wi` (3, n), steepest first."""
+    order = np.argsort(-wi[2], kind="stable")
+    directions, first = np.unique(np.round(wi.T[order], 6), axis=0, return_index=True)
+    return directions[np.argsort(first)][:MOST_PANELS]
+
+
+def grid(count: int, height: float) -> tuple[Figure, np.ndarray]:
+    """A figure of `count` panels in rows of four, `height` inches each, the last row not always full."""
+    columns = min(4, count)
+    rows = math.ceil(count / columns)
+    figure = Figure(figsize=(7.0, 1.0 + height * rows), layout="constrained")
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for k in range(count, len(panels)):
+        panels[k].set_visible(False)
+        panels[k - columns].tick_params(labelbottom=True)
+    return figure, panels
+
+
+def zenith_title(direction: np.ndarray) -> str:
+    return rf"$\theta_i = {math.degrees(math.acos(min(direction[2], 1))):.4g}°$"
+
+
+def model(fit: Fit, surface: Surface, wi: np.ndarray, wo: np.ndarray, wm: np.ndarray) -> np.ndarray:
+    """The fitted BRDF (bands, n) at directions (3, n)."""
     with solver.float64():
         return models.brdfs(fit.theta, wi, wo, wm, replace(surface, tail=fit.tail))
 
