@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from typer.core import TyperGroup
 
 from ggxref.errors import InputError
-from ggxref.files import write_atomically
+from ggxref.files import writable, write_atomically
 
 
 class _Verbs(TyperGroup):
@@ -88,8 +88,7 @@ def verify(
     from ggxref.verify import engine, errata, report
     from ggxref.verify import pages as write
 
-    if json and not json.parent.is_dir():
-        raise InputError(f"--json: {json} cannot be written: there is no directory {json.parent}")
+    writable("--json", json)
     if pages and not pages.is_dir():
         raise InputError(f"--pages: there is no directory {pages}")
     if (paper or equation) and (mutants or pages):
@@ -151,6 +150,7 @@ def vectors(
     """Write golden test vectors: inputs as bits, results proven correctly rounded, from the oracle alone."""
     from ggxref.golden import generate
 
+    writable("--json", json)
     order = generate.order(functions, dtypes, count, seed, form)
     if directory.exists() and not directory.is_dir():
         raise InputError(f"{directory}: is a file; vectors are written into a directory")
@@ -210,7 +210,7 @@ def fit(
     from ggxref.fit import command, options
 
     for option, path in (("--json", json), ("--figure", figure), ("--table", table)):
-        options.writable(option, path)
+        writable(option, path)
     given = {"model": model, "tail": tail, "masking": masking, "fresnel": fresnel, "min_cosine": min_cosine}
     given |= {"samples": samples, "degree": level, "fixed": options.fixed(fix or []), "tolerance": tolerance}
     size = options.pixel(pixel)
@@ -271,9 +271,10 @@ def choose(
     from ggxref.scene import image, report
     from ggxref.scene.read import read
 
-    for option, path in (("--json", json), ("--figure", figure), ("--pictures", pictures)):
-        if path and not path.parent.is_dir():
-            raise InputError(f"{option}: {path} cannot be written: there is no directory {path.parent}")
+    writable("--json", json)
+    writable("--figure", figure)
+    if pictures and not pictures.parent.is_dir():
+        raise InputError(f"--pictures: {pictures} cannot be written: there is no directory {pictures.parent}")
     console = Console()
     with Console(stderr=True).status("reading") as status:
         result = search.choose(read(scene), tolerance, lambda doing: status.update(f"rendering: {doing}"))
@@ -314,6 +315,8 @@ def grade(
 
     if sum(map(bool, (python or mapping, command, answers))) != 1:
         raise InputError("wanted one of --python (or --map), --command and --answers")
+    writable("--json", json)
+    writable("--html", html)
     order = generate.order(functions, dtypes, None, 1)
     tests = grading.selected(reading.read(directory or reading.SHIPPED, order.functions), order, test)
     if command:

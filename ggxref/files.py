@@ -4,6 +4,15 @@ import os
 import tempfile
 from pathlib import Path
 
+from ggxref.errors import InputError
+
+
+def writable(option: str, path: Path | None) -> None:
+    """That a file can be made at `path`; to be asked before the work whose result it takes."""
+    if path and (path.is_dir() or not path.parent.is_dir()):
+        why = "it is a directory" if path.is_dir() else f"there is no directory {path.parent}"
+        raise InputError(f"{option}: {path} cannot be written: {why}")
+
 
 def write_atomically(path: Path | str, data: bytes | str) -> None:
     """Write `data` (text as UTF-8) under a temporary name beside `path`, then rename it over `path`."""

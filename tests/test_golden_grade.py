@@ -247,6 +247,7 @@ def test_a_manifest_names_files_of_its_own_directory_only(directory, name):
         "no program": (["--command", "/no/such/program"], "cannot be started"),
         "no answers": (["--answers", "/no/such/file"], "cannot be read"),
         "no test": (["--command", "true", "--test", "999999"], "none of the vectors"),
+        "nowhere to write": (["--command", "true", "--json", "/nowhere/at/all.json"], "there is no directory"),
     }.values(),
 )
 def test_bad_usage_ends_with_2(arguments, message):

@@ -1,7 +1,6 @@
 """What the user types, made into numbers: `--fix NAME=VALUE` and `--pixel DX,DY`."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
@@ -30,13 +29,6 @@ def pixel(word: str | None) -> tuple[float, float] | None:
     if len(numbers) > 2:
         raise InputError(f"--pixel {word!r}; need one size in metres, or two: dx,dy")
     return numbers[0], numbers[-1]
-
-
-def writable(option: str, path: Path | None) -> None:
-    """That a file can be made at `path`; to be asked before the work whose result it takes."""
-    if path and (path.is_dir() or not path.parent.is_dir()):
-        why = "it is a directory" if path.is_dir() else f"there is no directory {path.parent}"
-        raise InputError(f"{option}: {path} cannot be written: {why}")
 
 
 def _numbers(option: str, text: str, count: int) -> list[float]:
