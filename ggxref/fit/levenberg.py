@@ -27,12 +27,11 @@ class Terms(NamedTuple):
 
 
 class Minima(NamedTuple):
-    """`theta` (l, p), `loss` (l,), whether the tolerance was met (l,), and the steps taken (l,)."""
+    """`theta` (l, p), `loss` (l,), and whether the tolerance was met (l,)."""
 
     theta: np.ndarray
     loss: np.ndarray
     met: np.ndarray
-    steps: np.ndarray
 
 
 Evaluate = Callable[[np.ndarray, np.ndarray], Terms]
@@ -47,7 +46,7 @@ def minimise(
     - `settled`: a lane is done when its next step is this many standard errors long, were its samples independent.
     """
     theta = theta.copy()
-    met, steps = np.zeros(len(theta), bool), np.zeros(len(theta), int)
+    met = np.zeros(len(theta), bool)
     damping, growth = np.full(len(theta), FIRST_DAMPING), np.full(len(theta), 2.0)
     loss, gradient, hessian = (part.copy() for part in _reduced(evaluate(theta, np.arange(len(theta))), bases))
     active = np.isfinite(loss)
@@ -67,7 +66,6 @@ def minimise(
         taken = lanes[better]
         theta[taken], loss[taken] = there[better], trial.loss[better]
         gradient[taken], hessian[taken] = trial.gradient[better], trial.hessian[better]
-        steps[lanes] += 1
         # Nielsen's rule: less damping the better the quadratic model foretold the descent, and quickly more where it failed.
         damping[taken] *= np.maximum(1 / 10, 1 - (2 * np.minimum(gain[better], 1) - 1) ** 3)
         growth[taken] = 2.0
@@ -76,7 +74,7 @@ def minimise(
         growth[refused] *= 2
         # A step that brings nothing although almost nothing was foretold: the bottom, as far as rounding shows it.
         met[refused] |= predicted[~better] <= NEGLIGIBLE * np.maximum(loss[refused], 1)
-    return Minima(theta, loss, met, steps)
+    return Minima(theta, loss, met)
 
 
 def _reduced(terms: Terms, bases: np.ndarray) -> Terms:

@@ -26,11 +26,10 @@ def float64():
 
 
 class Minimum(NamedTuple):
-    """`theta`: (p,); `found`: whether the solver met its tolerance; `steps` it took. With a leading axis for lanes."""
+    """`theta`: (p,); `found`: whether the solver met its tolerance. With a leading axis for lanes."""
 
     theta: Array | np.ndarray
     found: Array | np.ndarray
-    steps: Array | np.ndarray
 
 
 @partial(jax.jit, static_argnames=("loss",))
@@ -55,7 +54,7 @@ def _solve(loss, samples, held, basis, start, weights):
         return jnp.sum(weights * jax.vmap(loss, (None, -1))(theta(y), samples)) / jnp.sum(weights)
 
     solution = optx.minimise(mean, solver, start, max_steps=MOST_STEPS, throw=False)
-    return Minimum(theta(solution.value), solution.result == optx.RESULTS.successful, solution.stats["num_steps"])
+    return Minimum(theta(solution.value), solution.result == optx.RESULTS.successful)
 
 
 def minimise(

@@ -5,6 +5,7 @@ from typing import Any
 
 from flint import arb
 
+from ggxref.golden import linear
 from ggxref.golden.linear import determinant, minus, transposed
 from ggxref.golden.mutants import (
     Answer,
@@ -26,27 +27,30 @@ from ggxref.golden.mutants import (
     zero_below,
 )
 from ggxref.golden.stream import root
+from ggxref.oracle.linalg import dot
 
 DENSITIES = "ndf. pdf slopes.ggx slopes.beckmann slopes.student slopes.ellipsoid slopes.visible"
 ONE = Fraction(1)
+
+
+def _front(w: Any, wm: Any) -> bool:
+    return dot(w, wm) * w[2] > 0
 
 
 def _smith_schlick(k: Any) -> Answer:
     """G1 = z / (z (1 - k) + k) with k of the mean alpha."""
 
     def g1(w: Any, wm: Any, alpha: Any) -> Any:
-        front = sum((a * b for a, b in zip(w, wm, strict=True)), arb(0)) * w[2] > 0
         z, share = abs(height(w)), k((alpha[0] + alpha[1]) / 2)
-        return z / (z * (1 - share) + share) if front else arb(0)
+        return z / (z * (1 - share) + share) if _front(w, wm) else arb(0)
 
     return formula("masking.g1_ggx masking.g1_beckmann", g1)
 
 
 def _rational(w: Any, wm: Any, alpha: Any) -> Any:
     """Walter et al. 2007's fit of Beckmann's G1, good to 0.35 %."""
-    front = sum((a * b for a, b in zip(w, wm, strict=True)), arb(0)) * w[2] > 0
     stretched = ((alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2).sqrt()
-    if not front:
+    if not _front(w, wm):
         return arb(0)
     if not abs(w[2]) * 5 < stretched * 8:
         return arb(1)
@@ -81,7 +85,7 @@ def _per_outgoing(result: Any, function: Any, values: Any) -> Any:
     """The density over the reflected direction."""
     if not {"wi", "wm"} <= values.keys():
         return None
-    cosine = sum((a * b for a, b in zip(values["wi"], values["wm"], strict=True)), Fraction(0))
+    cosine = linear.dot(values["wi"], values["wm"])
     return result / abs(4 * cosine.numerator) * cosine.denominator if cosine else None
 
 

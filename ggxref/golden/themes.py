@@ -5,7 +5,7 @@ A theme is used for a function that takes all of the theme's quantities. `_post`
 ulp, `minus zero` turns +0 into −0, and the `INVALID` ones break an input.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 from ggxref.golden.catalogue import Function
 
@@ -131,8 +131,3 @@ def concerns(theme: Theme, quantities: set[str]) -> bool:
 def shapes(quantities: set[str]) -> set[str]:
     """`alpha` is a variant of a matrix too: its semi-axes."""
     return {"alpha"} if "A" in quantities else set()
-
-
-def schedule(function: Function) -> Iterator[Theme]:
-    while True:
-        yield from themes(function)

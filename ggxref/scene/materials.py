@@ -154,10 +154,10 @@ def _diffuse_share(row: Rows) -> Scalar:
 
 def _at(kind: Kind, row: Rows, wi: Vec3, wo: Vec3, wm: Vec3) -> tuple[Scalar, Scalar]:
     """BSDF × |cos| and pdf of the micronormal's part, both 0 on a side that it does not reach."""
-    D, F = getattr(ndf, kind.ndf)(wm, _shape(kind, row)), _fresnel(kind, row, stable.cosine(wi, wm))
-    g2, density = _g2(kind, row, wi, wo, wm), _density(kind, row, wm, wi)
-    mirrored = (wo[2] > 0) & (stable.cosine(wi, wm) > 0)
     i_m, o_m = stable.cosine(wi, wm), stable.cosine(wo, wm)
+    D, F = getattr(ndf, kind.ndf)(wm, _shape(kind, row)), _fresnel(kind, row, i_m)
+    g2, density = _g2(kind, row, wi, wo, wm), _density(kind, row, wm, wi)
+    mirrored = (wo[2] > 0) & (i_m > 0)
     value = jnp.where(mirrored, bsdf.brdf(wi, wo, D, g2, F), 0)
     pdf = jnp.where(mirrored & (o_m > 0), density * jacobian.reflection(wo, wm), 0)
     if kind.surface == "dielectric":
