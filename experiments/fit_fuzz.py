@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 import tracemalloc
+import warnings
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
@@ -22,6 +23,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--memory", type=int, default=20_000, help="cases under the slow memory counter")
     given = parser.parse_args()
+    warnings.simplefilter("error")
     random_ = random.Random(given.seed)
     seeds = fit_fuzz.seeds()
     outcomes = {"read": 0, "refused": 0}

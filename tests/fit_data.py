@@ -165,7 +165,7 @@ def rgl_fields(theta_i=(0.0, 30.0, 60.0, 85.0), grid=9) -> dict[str, np.ndarray]
 
 
 def merl(value, sizes=(90, 90, 180)) -> bytes:
-    """A MERL binary of one value per colour, [1/sr]."""
+    """A MERL binary of one value per colour, or one per colour and node (3, n), [1/sr]."""
     scales = np.array([[1.0], [1.15], [1.66]]) / 1500
-    planes = np.broadcast_to(np.asarray(value, float)[:, None] / scales, (3, int(np.prod(sizes))))
+    planes = np.broadcast_to(np.asarray(value, float).reshape(3, -1) / scales, (3, int(np.prod(sizes))))
     return np.array(sizes, "<i4").tobytes() + planes.astype("<f8").tobytes()

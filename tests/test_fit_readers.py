@@ -2,6 +2,7 @@
 
 import io
 import os
+import tracemalloc
 import zipfile
 
 import fit_data
@@ -249,6 +250,22 @@ class TestRgl:
         with pytest.raises(InputError, match=said):
             read(fit_data.write(tmp_path / "a", fit_data.tensor_file(fields)))
 
+    def test_memory_is_of_the_files_size(self, tmp_path):
+        """A fine grid of values under a long row of `vndf`: a table of both would have the file's size squared."""
+        fields = fit_data.rgl_fields(theta_i=(0.0,), grid=150) | {"vndf": np.ones((1, 1, 2, 60_000), "f4")}
+        path = fit_data.write(tmp_path / "a", fit_data.tensor_file(fields))
+        tracemalloc.start()
+        read(path)
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert most < 40 * path.stat().st_size
+
+    def test_a_name_as_long_as_the_file_is_not_repeated(self, tmp_path):
+        content = fit_data.tensor_file({"n" * 60_000: np.zeros(1, "f4")}).replace(b"\x01\x00\n", b"\xff\xff\n")
+        with pytest.raises(InputError, match="has type 10 and 65535 dimensions; need") as caught:
+            read(fit_data.write(tmp_path / "a", content))
+        assert len(str(caught.value)) < 1100
+
     @pytest.mark.parametrize("length", [13, 20, 60, 5000])
     def test_truncated(self, tmp_path, length):
         with pytest.raises(InputError, match=r"truncated|ends beyond"):
@@ -264,10 +281,12 @@ class TestRgl:
 
 class TestMerl:
     def test_the_true_size_comes_back(self, tmp_path):
-        data = read(fit_data.write(tmp_path / "a", fit_data.merl((0.1, 0.2, 0.3))))
-        assert isinstance(data, Reflectance)
-        assert len(data.wi) == 90 * 90 * 180
-        assert_allclose(data.values[::1000], np.tile([0.1, 0.2, 0.3], (1458, 1)), rtol=1e-14)
+        values = np.random.default_rng(0).random((3, 90 * 90 * 180))
+        path = fit_data.write(tmp_path / "a", fit_data.merl(values))
+        assert path.stat().st_size == 34_992_012
+        data = read(path)
+        assert isinstance(data, Reflectance) and data.bands == ("r", "g", "b")
+        assert_allclose(data.values, values.T, rtol=1e-14)
 
     def test_directions_have_their_half_and_difference_angles(self):
         wi, wo = merl.directions((6, 5, 4))

@@ -37,9 +37,22 @@ def parse(content: bytes, path: str, pixel: tuple[float, float] | None = None) -
     for name, recognise, reader in FORMATS:
         if recognise(content):
             source = Source(path, name, hashlib.sha256(content).hexdigest())
-            return reader(content, source, pixel) if reader in (array.parse, matrix.parse) else reader(content, source)
+            more = (pixel,) if reader in (array.parse, matrix.parse) else ()
+            try:
+                return reader(content, source, *more)
+            except InputError as error:
+                raise InputError(_clipped(str(error))) from error
     names = ", ".join(name for name, _, _ in FORMATS)
     raise InputError(f"{path}: no measurement known here; it starts with {content[:24]!r}; known formats: {names}")
+
+
+LONGEST_MESSAGE = 1000
+
+
+def _clipped(message: str) -> str:
+    """A name or a number in a broken file, which the message repeats, can be as long as the file."""
+    half = LONGEST_MESSAGE // 2
+    return message if len(message) <= LONGEST_MESSAGE else f"{message[:half]} … {message[-half:]}"
 
 
 def _bytes(path: Path) -> bytes:

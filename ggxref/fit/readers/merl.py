@@ -37,9 +37,9 @@ def parse(content: bytes, source: Source) -> Reflectance:
             f"{source.path}: {len(content)} bytes where {sizes} takes {_due(sizes)}; the file is truncated"
         )
     planes = np.frombuffer(content, "<f8", offset=HEADER).reshape(3, -1)
-    values = planes.T * SCALES
-    if not np.isfinite(values).all():
+    if not np.isfinite(planes).all():
         raise InputError(f"{source.path}: a value is not finite; a BRDF is, and a missing one negative")
+    values = planes.T * SCALES
     wi, wo = directions(sizes)
     missing = (values < 0).any(axis=1)
     below = (wi[:, 2] <= 0) | (wo[:, 2] <= 0)

@@ -8,6 +8,7 @@ mirrors the incident one. The value is $f\\cos\\theta_o = \\mathtt{rgb}\\; D(\\o
 
 import math
 import struct
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -174,12 +175,10 @@ def bilinear(table: np.ndarray, x, y) -> np.ndarray:
 def invert(density: np.ndarray, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The points (x, y) of the unit square below which the bilinear `density` holds the shares u of its row and v of all."""
     rows = _cumulative(density)  # (rows, columns)
-    total = rows[:, -1]
-    row, y = _share(_cumulative(total), v)
-    low, high = total[row], total[row + 1]
-    fraction = _root(low, high, y)
-    along = rows[row] * (1 - fraction)[:, None] + rows[row + 1] * fraction[:, None]
-    column, x = _share(along, u)
+    total = _cumulative(rows[:, -1])
+    row, y = _share(lambda k: total[k], len(total), v)
+    fraction = _root(rows[row, -1], rows[row + 1, -1], y)
+    column, x = _share(lambda k: rows[row, k] * (1 - fraction) + rows[row + 1, k] * fraction, density.shape[1], u)
     left, right = (density[row, column + k] * (1 - fraction) + density[row + 1, column + k] * fraction for k in (0, 1))
     across = _root(left, right, x)
     return (column + across) / (density.shape[1] - 1), (row + fraction) / (density.shape[0] - 1)
@@ -191,15 +190,22 @@ def _cumulative(values: np.ndarray) -> np.ndarray:
     return np.concatenate([np.zeros_like(values[..., :1]), np.cumsum(steps, axis=-1)], axis=-1)
 
 
-def _share(cumulative: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The cell in which the integral reaches `share` of its end, and how much of it is left for that cell.
+def _share(
+    cumulative: Callable[[np.ndarray], np.ndarray], nodes: int, share: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The cell in which an integral reaches `share` of its end, and how much of it is left for that cell.
 
-    - `cumulative`: (nodes,), or one row per share, (n, nodes).
+    - `cumulative(k)`: of each share its integral up to node k, (n,), from 0 and never falling.
+
+    By bisection: a table of every share's whole integral would take memory of the file's size squared.
     """
-    target = share * cumulative[..., -1]
-    cell = np.clip((cumulative <= target[:, None]).sum(axis=-1) - 1, 0, cumulative.shape[-1] - 2)
-    start = cumulative[cell] if cumulative.ndim == 1 else np.take_along_axis(cumulative, cell[:, None], 1)[:, 0]
-    return cell, target - start
+    target = share * cumulative(np.full(len(share), nodes - 1))
+    low, high = np.zeros(len(share), int), np.full(len(share), nodes - 1)
+    for _ in range(nodes.bit_length()):
+        middle = (low + high) // 2
+        below = cumulative(middle) <= target
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return low, target - cumulative(low)
 
 
 def _root(left: np.ndarray, right: np.ndarray, area: np.ndarray) -> np.ndarray:
