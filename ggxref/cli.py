@@ -188,6 +188,12 @@ def fit(
     min_cosine: Annotated[float, typer.Option(help="BRDF: leave out directions nearer to the horizon.")] = 0.05,
     samples: Annotated[int, typer.Option(help="BRDF: fit at most this many, evenly through the file.")] = 4096,
     level: Annotated[int, typer.Option(help="Heights: degree of the polynomial that is taken off first.")] = 1,
+    slopes: Annotated[
+        str, typer.Option(help="Heights: differences taken as slopes: central, cell (2 x 2) or facet (3 x 3).")
+    ] = "central",
+    smooth: Annotated[
+        float, typer.Option(metavar="METRES", help="Heights: Gaussian filter first, of this cutoff; 0 for none.")
+    ] = 0.0,
     pixel: Annotated[
         str | None, typer.Option(metavar="DX[,DY]", help="Heights: pixel size in metres, if FILE does not say it.")
     ] = None,
@@ -212,7 +218,8 @@ def fit(
     for option, path in (("--json", json), ("--figure", figure), ("--table", table)):
         writable(option, path)
     given = {"model": model, "tail": tail, "masking": masking, "fresnel": fresnel, "min_cosine": min_cosine}
-    given |= {"samples": samples, "degree": level, "fixed": options.fixed(fix or []), "tolerance": tolerance}
+    given |= {"samples": samples, "degree": level, "slopes": slopes, "smooth": smooth}
+    given |= {"fixed": options.fixed(fix or []), "tolerance": tolerance}
     size = options.pixel(pixel)
     if table:
         alone = [name for name, value in (("--json", json), ("--figure", figure), ("--export", export)) if value]

@@ -55,6 +55,8 @@ def test_reflectance(lobes, table):
 def test_heights(density):
     assert density.exit_code == 0, density.output
     assert "log-likelihood" in density.output and "anisotropy" in density.output
+    assert "levelled by a polynomial of degree 1, not smoothed" in density.output
+    assert "2116 slopes by central differences" in density.output
 
 
 def test_json_repeats_the_fit(lobes, density, folder, table):
@@ -110,6 +112,9 @@ def test_a_figure_shows_the_chosen_model_and_one_to_compare(surface):
         (["surface.x3p", "--fix", "A=1,0,0"], "need 9 numbers"),
         (["surface.x3p", "--pixel", "1,2,3"], "need one size in metres, or two"),
         (["surface.x3p", "--level", "99"], "polynomial of degree 99"),
+        (["surface.x3p", "--slopes", "sobel"], "slopes 'sobel'; need one of central, cell, facet"),
+        (["surface.x3p", "--smooth", "nan"], "a cutoff of nan m; need a length in metres"),
+        (["surface.x3p", "--smooth", "5"], "a cutoff of 5 m; need more than a pixel, 1e-06 m, and at most"),
         (["metal.csv", "--min-cosine", "1"], "smallest cosine 1"),
         (["metal.csv", "--figure", "a.gif"], "no figure format"),
         (["metal.csv", "--json", "missing/a.json"], "there is no directory missing"),

@@ -14,6 +14,7 @@ from ggxref.fit.found import Found
 from ggxref.fit.models import Surface
 from ggxref.fit.parameters import Model, Space
 from ggxref.fit.problem import FEWEST, Problem, from_reflectance, from_surface
+from ggxref.fit.slopes import ESTIMATORS
 from ggxref.fit.uncertainty import Spread, spread
 
 SETTLED = 0.01
@@ -31,11 +32,11 @@ TAILS = ("ggx", "student_t")
 class Fit:
     """One model's minimum.
 
-      - `tail`: the formula used. `space`: the model's free directions, `identified` those that did not run to a bound.
+    - `tail`: the formula used. `space`: the model's free directions, `identified` those that did not run to a bound.
     - `theta`: (p,), see `parameters`; `covariance` of θ, (p, p).
-      - `values`, `errors`: of the parameters and of what follows from them, by name, in the user's terms.
-      - `loss`: the mean that was minimised; `held_out`: the same on each fold, fitted without it.
-      - `log_rmse`: of reflectance, over positive samples; NaN for slopes.
+    - `values`, `errors`: of the parameters and of what follows from them, by name, in the user's terms.
+    - `loss`: the mean that was minimised; `held_out`: the same on each fold, fitted without it.
+    - `log_rmse`: of reflectance, over positive samples; NaN for slopes.
     - `agreeing`: how many starts, of how many, found this minimum. `trouble`: why the fit cannot be relied on, or "".
     """
 
@@ -85,6 +86,8 @@ class Options:
     min_cosine: float = 0.05
     samples: int = 4096
     degree: int = 1
+    slopes: str = "central"
+    smooth: float = 0.0
     tolerance: float | None = None
 
 
@@ -99,6 +102,8 @@ def fit(
     min_cosine: float = 0.05,
     samples: int = 4096,
     degree: int = 1,
+    slopes: str = "central",
+    smooth: float = 0.0,
     tolerance: float | None = None,
 ) -> Ladder:
     """Fit every model of these shapes and tails, and choose the smallest that suffices.
@@ -109,7 +114,8 @@ def fit(
     - `fixed`: values of parameters to hold, by name (`alpha_x`, `f0`, `diffuse`, …; `alpha` is both).
     - `min_cosine`: reflectance uses samples whose cosines with the normal exceed it.
     - `samples`: of reflectance, at most; more are thinned evenly.
-    - `degree`: of the polynomial that levels a height field.
+    - `degree`: of the polynomial that levels a height field; `slopes`: central, cell or facet, the differences taken of it;
+      `smooth`: metres, the cutoff of a Gaussian filter before that, 0 for none.
     - `tolerance`: the smallest model within this held-out loss of the best is chosen; without it, within one standard error.
     """
     given = Options(
@@ -121,6 +127,8 @@ def fit(
         min_cosine=min_cosine,
         samples=samples,
         degree=degree,
+        slopes=slopes,
+        smooth=smooth,
         tolerance=tolerance,
     )
     return fit_prepared([prepare(measurement, given)])[0]
@@ -149,7 +157,7 @@ def prepare(measurement: Reflectance | Heights, options: Options) -> Prepared:
         surface = Surface(masking=options.masking, fresnel=options.fresnel)
         problem = from_reflectance(measurement, surface, min_cosine=options.min_cosine, most=options.samples)
     else:
-        problem = from_surface(measurement, degree=options.degree)
+        problem = from_surface(measurement, degree=options.degree, estimator=options.slopes, cutoff=options.smooth)
     held = _fixed(options.fixed, problem.parameters)
     wanted = _wanted(shapes, options.model == AUTO, tails, problem, held)
     return Prepared(measurement, problem, wanted, held, options.tolerance)
@@ -171,6 +179,7 @@ def _check(options: Options) -> None:
     """Options that the user may give beyond their range."""
     _choice("masking", options.masking, ("height_correlated", "separable", "v_cavity"))
     _choice("fresnel", options.fresnel, tuple(parameters.FRESNEL))
+    _choice("slopes", options.slopes, tuple(ESTIMATORS))
     if not 0 <= options.min_cosine < 1:
         raise InputError(f"smallest cosine {options.min_cosine:g}; need a number from 0 to below 1")
     if options.samples < FEWEST:
@@ -179,6 +188,8 @@ def _check(options: Options) -> None:
         raise InputError(
             f"levelling by a polynomial of degree {options.degree}; need 0 (the mean), 1 (a plane), up to 8"
         )
+    if not 0 <= options.smooth < math.inf:
+        raise InputError(f"smoothing with a cutoff of {options.smooth:g} m; need a length in metres, or 0 for none")
     if options.tolerance is not None and not 0 <= options.tolerance < math.inf:
         raise InputError(f"tolerance {options.tolerance:g}; need a loss, 0 or more")
 

@@ -10,7 +10,7 @@ from ggxref.fit import objectives, parameters
 from ggxref.fit.data import Heights, Reflectance
 from ggxref.fit.models import Surface
 from ggxref.fit.parameters import Groups
-from ggxref.fit.slopes import TILES, Slopes, from_heights
+from ggxref.fit.slopes import ESTIMATORS, TILES, Slopes, from_heights
 
 FOLDS = 8
 """At most; as many as there are incident directions where those are fewer."""
@@ -77,10 +77,12 @@ def from_reflectance(data: Reflectance, surface: Surface, *, min_cosine: float, 
     )
 
 
-def from_surface(data: Heights, *, degree: int = 1) -> Problem:
-    """The slope density's problem, over the central differences of the surface levelled by a polynomial."""
-    surface = from_heights(data, degree=degree)
-    notes = [f"{len(surface.slopes)} slopes by central differences of the surface levelled by degree {degree}"]
+def from_surface(data: Heights, *, degree: int = 1, estimator: str = "central", cutoff: float = 0.0) -> Problem:
+    """The slope density's problem, over the slopes of the levelled and smoothed surface, as in `slopes.from_heights`."""
+    surface = from_heights(data, degree=degree, estimator=estimator, cutoff=cutoff)
+    smoothed = f"smoothed with a cutoff of {cutoff:g} m" if cutoff else "not smoothed"
+    notes = [f"the surface levelled by a polynomial of degree {degree}, {smoothed}"]
+    notes.append(f"{len(surface.slopes)} slopes {ESTIMATORS[estimator][1]}")
     notes += [f"{surface.missing} left out: a height is missing"] if surface.missing else []
     return from_slopes(surface, tuple(notes))
 

@@ -1,8 +1,11 @@
-"""From a height field to samples of its slope density P22: level the surface, then take central differences."""
+"""From a height field to samples of its slope density P22: level the surface, smooth it if asked to, then take differences."""
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
 
 from ggxref.errors import InputError
 from ggxref.fit.data import Heights
@@ -37,24 +40,74 @@ def level(heights: np.ndarray, degree: int) -> np.ndarray:
     return heights - basis @ coefficients
 
 
-def central_slopes(heights: np.ndarray, pixel: tuple[float, float]) -> np.ndarray:
-    """The slope (∂h/∂x, ∂h/∂y) at each inner point, (ny - 2, nx - 2, 2), NaN where a neighbour is missing.
+LONGEST_CUTOFF = 1 / 4
+"""Of a side: beyond it the edges, where the filter sees half of what it averages, are most of the surface."""
 
-    The normal is (-∂h/∂x, -∂h/∂y, 1) normalised, so that its slope (-x/z, -y/z) is (∂h/∂x, ∂h/∂y).
+
+def smooth(heights: np.ndarray, pixel: tuple[float, float], cutoff: float) -> np.ndarray:
+    """Heights through the Gaussian filter of ISO 16610-61: of waves of length `cutoff` [m] half is left, of shorter ones less.
+
+    What is missing stays so, and its neighbours are averages of what is known.
     """
+    known = np.isfinite(heights)
+    sigma = [cutoff * math.sqrt(2 * math.log(2)) / (2 * math.pi * size) for size in reversed(pixel)]
+    total = ndimage.gaussian_filter(np.where(known, heights, 0.0), sigma, mode="constant")
+    return np.where(
+        known, total / np.where(known, ndimage.gaussian_filter(known.astype(float), sigma, mode="constant"), 1), np.nan
+    )
+
+
+# Each: slopes (∂h/∂x, ∂h/∂y), (rows, columns, 2), NaN where a height that it needs is missing. The normal is
+# (-∂h/∂x, -∂h/∂y, 1) normalised, so that its slope (-x/z, -y/z) is (∂h/∂x, ∂h/∂y).
+
+
+def central_slopes(heights: np.ndarray, pixel: tuple[float, float]) -> np.ndarray:
+    """At each inner point, from its four neighbours."""
     dx, dy = pixel
     along_x = (heights[1:-1, 2:] - heights[1:-1, :-2]) / (2 * dx)
     along_y = (heights[2:, 1:-1] - heights[:-2, 1:-1]) / (2 * dy)
     return np.stack([along_x, along_y], axis=-1)
 
 
-def from_heights(field: Heights, *, degree: int = 1) -> Slopes:
-    """Slopes of the levelled surface; x runs along a row, y from row to row."""
+def cell_slopes(heights: np.ndarray, pixel: tuple[float, float]) -> np.ndarray:
+    """Amid each four points, of the plane nearest to them: the finest, and the one that noise moves most."""
+    dx, dy = pixel
+    along_x, along_y = np.diff(heights, axis=1) / dx, np.diff(heights, axis=0) / dy
+    return np.stack([(along_x[1:] + along_x[:-1]) / 2, (along_y[:, 1:] + along_y[:, :-1]) / 2], axis=-1)
+
+
+def facet_slopes(heights: np.ndarray, pixel: tuple[float, float]) -> np.ndarray:
+    """At each inner point, of the plane nearest to it and its eight neighbours: a third of the noise's variance."""
+    dx, dy = pixel
+    along_x, along_y = (heights[:, 2:] - heights[:, :-2]) / (2 * dx), (heights[2:] - heights[:-2]) / (2 * dy)
+    return np.stack(
+        [(along_x[:-2] + along_x[1:-1] + along_x[2:]) / 3, (along_y[:, :-2] + along_y[:, 1:-1] + along_y[:, 2:]) / 3],
+        axis=-1,
+    )
+
+
+Estimator = Callable[[np.ndarray, tuple[float, float]], np.ndarray]
+ESTIMATORS: dict[str, tuple[Estimator, str]] = {
+    "central": (central_slopes, "by central differences"),
+    "cell": (cell_slopes, "of planes through 2 x 2 heights"),
+    "facet": (facet_slopes, "of planes through 3 x 3 heights"),
+}
+
+
+def from_heights(field: Heights, *, degree: int = 1, estimator: str = "central", cutoff: float = 0.0) -> Slopes:
+    """Slopes of the levelled and smoothed surface; x runs along a row, y from row to row.
+
+    - `cutoff`: of `smooth`, in metres; 0 leaves the surface as it is.
+    """
     path = field.source.path
     known = int(np.isfinite(field.heights).sum())
     if known < FEWEST:
         raise InputError(f"{path}: {known} heights; need at least {FEWEST}")
-    grid = central_slopes(level(field.heights, degree), field.pixel)
+    levelled = level(field.heights, degree)
+    if cutoff:
+        _check_cutoff(field, cutoff)
+        levelled = smooth(levelled, field.pixel, cutoff)
+    grid = ESTIMATORS[estimator][0](levelled, field.pixel)
     good = np.isfinite(grid).all(axis=-1)
     slopes = grid[good]
     if len(slopes) < FEWEST:
@@ -67,3 +120,12 @@ def from_heights(field: Heights, *, degree: int = 1) -> Slopes:
     rows, columns = (np.arange(size) * TILES // size for size in grid.shape[:2])
     tile = rows[:, None] * TILES + columns
     return Slopes(slopes, tile[good], int(good.size - good.sum()))
+
+
+def _check_cutoff(field: Heights, cutoff: float) -> None:
+    shortest = min(size * pixel for size, pixel in zip(reversed(field.heights.shape), field.pixel, strict=True))
+    if not min(field.pixel) < cutoff <= LONGEST_CUTOFF * shortest:
+        raise InputError(
+            f"{field.source.path}: smoothing with a cutoff of {cutoff:g} m; need more than a pixel, {min(field.pixel):g} m, "
+            f"and at most a quarter of the shorter side, {LONGEST_CUTOFF * shortest:.3g} m"
+        )
