@@ -3,7 +3,7 @@
 import os
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -13,7 +13,7 @@ from ggxref.errors import InputError
 from ggxref.golden import callables, program, text
 from ggxref.golden.cases import mapped
 from ggxref.golden.diagnose import Diagnosis, diagnose
-from ggxref.golden.generate import Order
+from ggxref.golden.generate import Order, workers
 from ggxref.golden.reading import Test
 from ggxref.golden.rounding import Format, decode, is_nan, to_hex
 from ggxref.golden.verdict import Failure, Verdict, judge
@@ -103,14 +103,20 @@ def of_python(
 ) -> Grade:
     answers: text.Answers = {}
     groups = list(text.groups(tests))
-    # Compiling lets other threads run; a plain Python function would only wait for them.
-    with ThreadPoolExecutor(os.cpu_count() if implementation.jax else 1) as pool:
-        asked = pool.map(lambda g: callables.ask(implementation, g[2]), groups)
-        for (function, fmt, group), given in zip(groups, asked, strict=True):
-            for test, answer in zip(group, given or [], strict=given is not None):
-                answers[function.id, fmt.name, test.id] = fitting(answer, test, text.like(group))
-            advance(len(group))
-    return collect(tests, answers, strict)
+    # A process more takes as long to start as a few functions to compile.
+    jobs = max(1, min(os.cpu_count() or 1, len(groups) // 8)) if implementation.jax else 1
+    trouble = ""
+    try:
+        with workers(jobs) as submit:
+            asked = [submit(callables.ask, implementation, group) for _, _, group in groups]
+            for (function, fmt, group), answer_all in zip(groups, asked, strict=True):
+                given = answer_all()
+                for test, answer in zip(group, given or [], strict=given is not None):
+                    answers[function.id, fmt.name, test.id] = fitting(answer, test, text.like(group))
+                advance(len(group))
+    except BrokenProcessPool:
+        trouble = "the functions ended the process that called them"
+    return collect(tests, answers, strict, trouble)
 
 
 def fitting(answer: Any, test: Test, example: Any) -> Any:
