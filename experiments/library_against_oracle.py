@@ -33,7 +33,7 @@ def measure(job: tuple[str, int, int]) -> tuple[str, float, float, int]:
     got = library.numbers(library.over_rows(library.public(name), inputs))
 
     def true(point):
-        return raised(lambda: lookup(name)(**point), exact.BITS, name)
+        return raised(lambda: lookup(name)(**point), exact.BITS, name, point)
 
     worst = over = 0.0
     undecided = 0

@@ -22,7 +22,7 @@ def worst(name, function):
     got = library.numbers(library.over_rows(function, inputs))
 
     def true(point):
-        return raised(lambda: lookup(name)(**point), 256, name)
+        return raised(lambda: lookup(name)(**point), 256, name, point)
 
     rows = ({argument: x[k] for argument, x in inputs.items()} for k in range(POINTS))
     errors = [error(true, point, row, np.finfo(float), LIMIT) for point, row in zip(rows, got.tolist(), strict=True)]

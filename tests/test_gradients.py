@@ -59,7 +59,7 @@ def quotient(name: str, inputs, changes) -> tuple[float, float]:
     def both():
         return float(((combined(1) - combined(-1)) / (2 * STEP)).mid()), float(combined(0).mid())
 
-    return raised(both, BITS, name)
+    return raised(both, BITS, name, inputs)
 
 
 def moved_by(x, d, step):

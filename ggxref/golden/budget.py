@@ -62,14 +62,15 @@ def perturbed(x: Any, matrix: bool, row: Fraction = Fraction(1)) -> Iterator[tup
 def sensitivity(case: Case, bits: int = 256) -> Sensitivity:
     """Condition number and spread of a case; `OverflowError` where f jumps."""
     with working(bits):
-        result = evaluate(case.function, case.values, bits)
+        given = {argument: exact(x) for argument, x in case.values.items()}
+        result = evaluate(case.function, given, bits)
         value = [*leaves(result)]
         if not all(f.is_finite() for f in value):
             return Sensitivity(Fraction(0), Fraction(0))
         relative, absolute = [arb(0)] * len(value), [arb(0)] * len(value)
         for argument, x in case.values.items():
             for y, number, size in perturbed(x, case.function.arguments[argument] in MATRICES):
-                moved = leaves(evaluate(case.function, case.values | {argument: y}, bits))
+                moved = leaves(evaluate(case.function, given | {argument: y}, bits))
                 changes = [abs(m - f) for m, f in zip(moved, value, strict=True)]
                 half = exact(ulp(number, case.fmt) / size / 2 if number else Fraction(0))
                 relative = [r + c for r, c in zip(relative, changes, strict=True)]

@@ -19,4 +19,4 @@ def evaluate(function: Function, values: dict[str, Any], bits: int) -> Any:
         x = balls.pop(function.derivative)
         return gradient(lambda y: f(**balls, **{function.derivative: y}), x)
 
-    return precision.raised(attempt, bits, f"the gradient of {function.name}({inputs})")
+    return precision.raised(attempt, bits, function.id, inputs)

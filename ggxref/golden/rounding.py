@@ -7,6 +7,7 @@ ends round to the same number: rounding is monotone, so every number between the
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 
 from flint import arb
 
@@ -96,7 +97,7 @@ def decode(bits: int, fmt: Format) -> Fraction:
     field, significand = magnitude >> (fmt.precision - 1), magnitude & (hidden - 1)
     if field:
         significand, field = significand + hidden, field - 1
-    value = Fraction(significand << field) * Fraction(2) ** fmt.quantum
+    value = (significand << field) * power(fmt.quantum)
     return -value if bits & fmt.sign else value
 
 
@@ -108,7 +109,13 @@ def is_nan(bits: int, fmt: Format) -> bool:
 def ulp(x: Fraction, fmt: Format) -> Fraction:
     """Distance between neighbours in the binade of `x`; at 0 and below the normal range, the smallest subnormal."""
     e = max(binade(x), fmt.emin) if x else fmt.emin
-    return Fraction(2) ** (min(e, fmt.emax) - fmt.precision + 1)
+    return power(min(e, fmt.emax) - fmt.precision + 1)
+
+
+@cache
+def power(exponent: int) -> Fraction:
+    """2^exponent."""
+    return Fraction(2) ** exponent
 
 
 def to_hex(bits: int, fmt: Format) -> str:
@@ -127,8 +134,8 @@ def from_hex(text: str, fmt: Format) -> int:
 
 def dyadic(x: arb) -> Fraction:
     """Value of an exact ball."""
-    man, exp = x.man_exp()
-    return Fraction(int(man)) * Fraction(2) ** int(exp)
+    man, exp = map(int, x.man_exp())
+    return Fraction(man << exp) if exp >= 0 else Fraction(man, 1 << -exp)
 
 
 def ends(ball: arb) -> tuple[Fraction, Fraction]:
@@ -139,7 +146,7 @@ def ends(ball: arb) -> tuple[Fraction, Fraction]:
     if any(part != 0 and abs(int(part.man_exp()[1])) > LARGEST_EXPONENT for part in (mid, rad)):
         raise OverflowError("the result is beyond 2^±30000: too long to write, and no dtype holds it")
     centre, radius = dyadic(mid), dyadic(rad)
-    return centre - radius, centre + radius
+    return (centre - radius, centre + radius) if radius else (centre, centre)
 
 
 def round_ball(ball: arb, fmt: Format) -> int:

@@ -6,6 +6,7 @@ ulp, `minus zero` turns +0 into −0, and the `INVALID` ones break an input.
 """
 
 from collections.abc import Mapping
+from functools import cache
 
 from ggxref.golden.catalogue import Function
 
@@ -113,7 +114,12 @@ _FROM = {"u3": "u", "rows": "u", "mean": "A", "scatter": "A", "n_i": "eta", "fac
 
 def themes(function: Function) -> list[Theme]:
     """The themes that concern the function, with a plain draw before them and after every second."""
-    quantities = set(function.arguments.values())
+    return _themes(frozenset(function.arguments.values()))
+
+
+@cache
+def _themes(drawn: frozenset[str]) -> list[Theme]:
+    quantities = set(drawn)
     quantities |= {_FROM[q] for q in quantities if q in _FROM}
     if "slope" in quantities:
         quantities.add("wm")

@@ -99,15 +99,15 @@ def lookup(name: str) -> Callable[..., Any]:
         raise ValueError(f"the oracle has no function {name!r}") from error
 
 
-def raised(attempt: Callable[[], Any], bits: int, what: str) -> Any:
-    """`attempt()` at the first precision from `bits` on, doubling, at which it is decided."""
+def raised(attempt: Callable[[], Any], bits: int, name: str, inputs: Mapping[str, Any]) -> Any:
+    """`attempt()` at the first precision from `bits` on, doubling, at which it is decided; else an error that says which."""
     while bits <= MAX_BITS:
         try:
             with working(bits):
                 return attempt()
         except Undecided as error:
             reason, bits = error, 2 * bits
-    raise ArithmeticError(f"{what}: undecided at {MAX_BITS} bits: {reason}")
+    raise ArithmeticError(f"{name}({inputs}): undecided at {MAX_BITS} bits: {reason}")
 
 
 def evaluate(name: str, inputs: Mapping[str, Any], bits: int) -> Any:
@@ -118,7 +118,7 @@ def evaluate(name: str, inputs: Mapping[str, Any], bits: int) -> Any:
     if bits > MAX_BITS:
         raise ValueError(f"at most {MAX_BITS} bits, got {bits}")
     function = lookup(name)
-    return raised(lambda: function(**{key: exact(value) for key, value in inputs.items()}), bits, f"{name}({inputs})")
+    return raised(lambda: function(**{key: exact(value) for key, value in inputs.items()}), bits, name, inputs)
 
 
 def digits(name: str, inputs: Mapping[str, Any], n: int) -> Any:
@@ -131,7 +131,7 @@ def digits(name: str, inputs: Mapping[str, Any], n: int) -> Any:
     def attempt() -> Any:
         return decimal(function(**{key: exact(value) for key, value in inputs.items()}), n)
 
-    return raised(attempt, 64 + 4 * n, f"{n} digits of {name}({inputs})")
+    return raised(attempt, 64 + 4 * n, name, inputs)
 
 
 def decimal(x: Any, n: int) -> Any:
