@@ -78,6 +78,7 @@ def canonical(A: Mat3) -> Mat3:
     return jnp.stack([jnp.stack([c00, c10, zero]), jnp.stack([zero, c11, zero]), jnp.stack([*e, one])])
 
 
+@stable.widened
 def from_slopes(mean: Vec2, scatter: Mat2) -> Mat3:
     r"""The canonical `A` whose slope density is the Student-t density at `mean` with shape `scatter`/2.
 

@@ -59,6 +59,7 @@ def g1_beckmann(w: Vec3, wm: Vec3, alpha: Vec2) -> Scalar:
     return jnp.where(_front(w, wm), jnp.abs(w[2]) / jnp.where(sigma > 0, sigma, 1), 0)
 
 
+@stable.widened
 def g1_v_cavity(w: Vec3, wm: Vec3) -> Scalar:
     r"""G1 of V-cavities: $\min(1, 2|\omega_m\cdot n||\omega\cdot n|/|\omega\cdot\omega_m|)$ on front faces, else 0.
 

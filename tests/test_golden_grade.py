@@ -247,6 +247,7 @@ def test_a_manifest_names_files_of_its_own_directory_only(directory, name):
         "no program": (["--command", "/no/such/program"], "cannot be started"),
         "no answers": (["--answers", "/no/such/file"], "cannot be read"),
         "no test": (["--command", "true", "--test", "999999"], "none of the vectors"),
+        "quick without jax": (["--python", "ggxref", "--quick"], "there is no --jax"),
         "nowhere to write": (["--command", "true", "--json", "/nowhere/at/all.json"], "there is no directory"),
     }.values(),
 )
@@ -254,6 +255,27 @@ def test_bad_usage_ends_with_2(arguments, message):
     result = run(app, ["grade", "--functions", "ndf.ggx", *arguments])
     assert result.exit_code == 2
     assert message in " ".join(result.stderr.split())
+
+
+@pytest.mark.parametrize("options", [[], ["--quick"]])
+def test_the_library_passes_as_compiled(options):
+    """A slice, of values and gradients in all dtypes; the whole set takes a minute (docs/vectors.md)."""
+    asked = ["--functions", "fresnel,masking.lambda_ggx,ndf.ggx.d_alpha", "--python", "ggxref", "--jax", *options]
+    result = run(app, ["grade", *asked])
+    assert result.exit_code == 0, result.output
+    assert re.search(r"passed: (\d+) of \1 tests pass", result.output)
+
+
+def test_functions_that_end_their_process_are_reported(tmp_path, monkeypatch):
+    (tmp_path / "made_up_crash.py").write_text(
+        "import os, types\nfresnel = bsdf = types.SimpleNamespace()\n"
+        "for name in 'dielectric conductor schlick brdf btdf'.split(): setattr(bsdf, name, lambda **_: os._exit(3))\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr("os.cpu_count", lambda: 2)  # of one, it would be this process
+    result = run(app, ["grade", "--functions", "fresnel,bsdf", "--python", "made_up_crash", "--jax"])
+    assert result.exit_code == 1
+    assert "ended the process" in result.output
 
 
 def test_answers_of_a_file_are_graded_as_those_of_a_program(tmp_path):

@@ -13,25 +13,23 @@ r"""How far a result may be off: the condition number, and the error in ulp that
   a wrong length does what a wrong component does.
 """
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
-from flint import arb
+from flint import arb, fmpq
 
 from ggxref.golden.cases import Case, leaves
 from ggxref.golden.compare import vectors
 from ggxref.golden.exact import evaluate
-from ggxref.golden.linear import dot
-from ggxref.golden.rounding import Format, Undecided, decimal, ends, ulp
+from ggxref.golden.linear import ONE, dot
+from ggxref.golden.rounding import Format, Undecided, decimal, ends, rational, ulp
 from ggxref.oracle.precision import exact, working
 
 # Relative step of the difference quotient: its own error is 2^-80 of a second derivative.
-STEP = Fraction(1, 1 << 80)
+STEP = fmpq(1, 1 << 80)
 # A smaller condition number is written as 0: the enclosure of a derivative that vanishes never proves that it does.
-NEGLIGIBLE = Fraction(1, 1 << 20)
+NEGLIGIBLE = fmpq(1, 1 << 20)
 MOST_BITS = 4096
 # Quantities that are matrices, not lists of vectors.
 MATRICES = frozenset({"A", "scatter"})
@@ -41,19 +39,19 @@ MATRICES = frozenset({"A", "scatter"})
 class Sensitivity:
     """`condition` and `spread` of a result, to three digits."""
 
-    condition: Fraction
-    spread: Fraction
+    condition: fmpq
+    spread: fmpq
 
 
-def perturbed(x: Any, matrix: bool, row: Fraction = Fraction(1)) -> Iterator[tuple[Any, Fraction, Fraction]]:
+def perturbed(x: Any, matrix: bool, row: fmpq = ONE) -> Iterator[tuple[Any, fmpq, fmpq]]:
     """The nested input with one of its numbers after the other changed by STEP times itself, in a matrix times its row;
     beside it the number, and the change over STEP."""
-    if isinstance(x, Fraction):
+    if isinstance(x, fmpq):
         size = row if matrix else abs(x)
         if size:
             yield x + STEP * size, x, size
         return
-    if matrix and isinstance(x[0], Fraction):
+    if matrix and isinstance(x[0], fmpq):
         row = max(map(abs, x))
     for i, part in enumerate(x):
         yield from ((((*x[:i], y, *x[i + 1 :])), number, size) for y, number, size in perturbed(part, matrix, row))
@@ -66,13 +64,13 @@ def sensitivity(case: Case, bits: int = 256) -> Sensitivity:
         result = evaluate(case.function, given, bits)
         value = [*leaves(result)]
         if not all(f.is_finite() for f in value):
-            return Sensitivity(Fraction(0), Fraction(0))
+            return Sensitivity(fmpq(0), fmpq(0))
         relative, absolute = [arb(0)] * len(value), [arb(0)] * len(value)
         for argument, x in case.values.items():
             for y, number, size in perturbed(x, case.function.arguments[argument] in MATRICES):
                 moved = leaves(evaluate(case.function, given | {argument: y}, bits))
                 changes = [abs(m - f) for m, f in zip(moved, value, strict=True)]
-                half = exact(ulp(number, case.fmt) / size / 2 if number else Fraction(0))
+                half = exact(ulp(number, case.fmt) / size / 2 if number else fmpq(0))
                 relative = [r + c for r, c in zip(relative, changes, strict=True)]
                 absolute = [a + c * half for a, c in zip(absolute, changes, strict=True)]
         shares = iter(zip(relative, absolute, strict=True))
@@ -84,13 +82,13 @@ def sensitivity(case: Case, bits: int = 256) -> Sensitivity:
     return sensitivity(case, 2 * bits)
 
 
-def measured(part: Sequence[arb], changes: Sequence[Any], fmt: Format) -> tuple[Fraction, Fraction] | None:
+def measured(part: Sequence[arb], changes: Sequence[Any], fmt: Format) -> tuple[fmpq, fmpq] | None:
     """Condition number and spread of one vector from both changes of each component; None without three proven digits."""
     relative, absolute = zip(*changes, strict=True)
     (low, high), (size, size_high) = largest(relative), largest(part)
     # A zero has no relative change; where it is a minimum, as F at equal indices, it has no first derivative either.
     if high <= NEGLIGIBLE * STEP * (size if size_high else 1):
-        return Fraction(0), Fraction(0)
+        return fmpq(0), fmpq(0)
     if size_high == 0:
         raise OverflowError("the result is 0 here and not 0 beside it")
     if not size:
@@ -100,20 +98,22 @@ def measured(part: Sequence[arb], changes: Sequence[Any], fmt: Format) -> tuple[
     return None if condition is None or spread is None else (condition, spread)
 
 
-def three_digits(low: Fraction, high: Fraction) -> Fraction | None:
+def three_digits(low: fmpq, high: fmpq) -> fmpq | None:
     """A difference over STEP that lies between these; None if three digits are not proven."""
     digits = decimal(low / STEP, 3)
-    return Fraction(digits) if digits == decimal(high / STEP, 3) else None
+    return rational(digits) if digits == decimal(high / STEP, 3) else None
 
 
-def largest(balls: Sequence[arb]) -> tuple[Fraction, Fraction]:
+def largest(balls: Sequence[arb]) -> tuple[fmpq, fmpq]:
     """Both ends of the largest magnitude."""
     magnitudes = [ends(abs(ball)) for ball in balls]
-    return max(Fraction(0), *(low for low, _ in magnitudes)), max(high for _, high in magnitudes)
+    return max(fmpq(0), *(low for low, _ in magnitudes)), max(high for _, high in magnitudes)
 
 
-def allowance(case: Case, condition: Fraction) -> int:
+def allowance(case: Case, condition: fmpq) -> int:
     """The error in ulp that a careful implementation can keep."""
     # |w|² - 1 is twice |w| - 1.
-    lengths = sum(abs(dot(w, w) - 1) for w in case.directions().values()) / 2 * (1 << (case.fmt.precision - 1))
-    return math.ceil(case.function.base + condition + (4 + condition) * lengths)
+    lengths = (
+        sum((abs(dot(w, w) - 1) for w in case.directions().values()), fmpq(0)) / 2 * (1 << (case.fmt.precision - 1))
+    )
+    return int((case.function.base + condition + (4 + condition) * lengths).ceil())

@@ -2,8 +2,9 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
+
+from flint import fmpq
 
 from ggxref.golden.catalogue import Function
 from ggxref.golden.inputs import Draw
@@ -12,6 +13,8 @@ from ggxref.golden.stream import Stream
 from ggxref.golden.themes import Theme, themes
 
 DIRECTIONS = frozenset({"wi", "wo", "wm"})
+# What describes a skewed surface.
+SHAPES = frozenset({"A", "mean", "scatter"})
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ def stretched(s: Stream, fmt: Format, quantity: str, x: Any) -> Any:
     """A direction made a few ulp longer or shorter, as after a chain of reflections."""
     if quantity not in DIRECTIONS:
         return x
-    factor = 1 + s.sign() * Fraction(2 + s.below(7), 1 << fmt.precision)
+    factor = 1 + s.sign() * fmpq(2 + s.below(7), 1 << fmt.precision)
     return tuple(factor * c for c in x)
 
 
@@ -77,7 +80,9 @@ def case(seed: int, function: Function, fmt: Format, index: int) -> Case | None:
     # A swapped case repeats the draws of its partner, the same theme unswapped.
     partner = cycle.index({k: v for k, v in theme.items() if k != "_post"}) if post == "swap" else place
     label = seed, function.name, fmt.name, index - place + partner
-    drawn = Draw(label, fmt, theme)
+    # Without a shape matrix the surface is the one of `alpha`: its lobe has neither skew nor shear.
+    shaped = not SHAPES.isdisjoint(function.arguments.values())
+    drawn = Draw(label, fmt, theme if shaped else {**theme, "A": "aligned"})
     exact = {argument: getattr(drawn, quantity) for argument, quantity in function.arguments.items()}
     if post == "swap":
         exact = {a: swapped(q, exact[a]) for a, q in function.arguments.items()}

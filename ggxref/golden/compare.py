@@ -1,8 +1,9 @@
 """The distance between an answer and the exact result, in units in the last place."""
 
 from collections.abc import Iterator
-from fractions import Fraction
 from typing import Any
+
+from flint import fmpq
 
 from ggxref.golden.rounding import Format, decode, is_nan, ulp
 
@@ -18,20 +19,20 @@ def vectors(x: Any) -> Iterator[tuple[Any, ...]]:
         yield x
 
 
-def value(bits: int, fmt: Format) -> Fraction:
+def value(bits: int, fmt: Format) -> fmpq:
     """The number of the bits; infinity counts as the power of two where overflow starts."""
     magnitude = bits & (fmt.sign - 1)
     if magnitude == fmt.infinity:
-        return Fraction(2) ** (fmt.emax + 1) * (-1 if bits & fmt.sign else 1)
+        return fmpq(2) ** (fmt.emax + 1) * (-1 if bits & fmt.sign else 1)
     return decode(bits, fmt)
 
 
-def distance(got: Any, expected: Any, fmt: Format) -> Fraction | None:
+def distance(got: Any, expected: Any, fmt: Format) -> fmpq | None:
     """The largest difference of bits nested alike, in ulp of the largest component of its vector; None for a NaN.
 
     +0 and -0 are equal.
     """
-    worst = Fraction(0)
+    worst = fmpq(0)
     for answer, right in zip(vectors(got), vectors(expected), strict=True):
         if any(is_nan(bits, fmt) for bits in answer):
             return None

@@ -2,10 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
-from flint import arb
+from flint import arb, fmpq
 
 from ggxref.golden.cases import leaves, mapped
 from ggxref.golden.compare import distance
@@ -20,7 +19,7 @@ MOST_FAILURES, MOST_PASSES = 40, 20
 # Of so many failures a mutant must explain so many to be looked at closely.
 FIRST_LOOK, LEAST_FIRST = 8, 2
 # A mutant is named if it explains at least this share of the failures and of its own.
-LEAST_SHARE = Fraction(1, 2)
+LEAST_SHARE = fmpq(1, 2)
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ def rounded(ball: arb, test: Test) -> int:
     """The middle of the ball, rounded: a mutant needs no proof."""
     if ball == arb.pos_inf():
         return test.fmt.infinity
-    return encode(sum(ends(ball), Fraction(0)) / 2, test.fmt)
+    return encode(sum(ends(ball), fmpq(0)) / 2, test.fmt)
 
 
 def alike(got: Any, predicted: Any, test: Test) -> bool:
@@ -63,7 +62,7 @@ def spread_out(verdicts: Sequence[Verdict], most: int) -> list[Verdict]:
     return list(verdicts[::step])
 
 
-def share(mutant: Mutant, wrong: Sequence[Verdict], right: Sequence[Verdict]) -> tuple[Fraction, int]:
+def share(mutant: Mutant, wrong: Sequence[Verdict], right: Sequence[Verdict]) -> tuple[fmpq, int]:
     """How well the mutant explains the verdicts: explained failures over those and what it explains wrongly."""
     explained = against = 0
     for v in wrong:
@@ -75,7 +74,7 @@ def share(mutant: Mutant, wrong: Sequence[Verdict], right: Sequence[Verdict]) ->
         for v in right:
             predicted = prediction(mutant, v.test)
             against += predicted is not None and not judge(v.test, predicted).passed
-    return Fraction(explained, len(wrong) + against), explained
+    return fmpq(explained, len(wrong) + against), explained
 
 
 def diagnose(verdicts: Sequence[Verdict]) -> Diagnosis | None:
@@ -89,7 +88,7 @@ def diagnose(verdicts: Sequence[Verdict]) -> Diagnosis | None:
     likely = [m for m in MUTANTS if share(m, first, [])[1] >= min(LEAST_FIRST, len(first))]
     # Of equals the first: `max` keeps it.
     scores = [(*share(m, wrong, right), m) for m in likely]
-    best, explained, mutant = max(scores, key=lambda s: s[:2], default=(Fraction(0), 0, None))
+    best, explained, mutant = max(scores, key=lambda s: s[:2], default=(fmpq(0), 0, None))
     if mutant is None or best < LEAST_SHARE:
         return None
     return Diagnosis(verdicts[0].test.function.id, mutant, explained, len(wrong))

@@ -5,9 +5,10 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
+
+from flint import fmpq
 
 from ggxref.errors import InputError
 from ggxref.golden import callables, program, text
@@ -15,7 +16,7 @@ from ggxref.golden.cases import mapped
 from ggxref.golden.diagnose import Diagnosis, diagnose
 from ggxref.golden.generate import Order, workers
 from ggxref.golden.reading import Test
-from ggxref.golden.rounding import Format, decode, is_nan, to_hex
+from ggxref.golden.rounding import Format, decode, is_nan, to_float, to_hex
 from ggxref.golden.verdict import Failure, Verdict, judge
 
 
@@ -47,11 +48,11 @@ class Grade:
 
 
 def worst(verdicts: Sequence[Verdict]) -> Verdict:
-    """The verdict that exceeds its budget most; one without a number is the worst of all."""
+    """The verdict that exceeds its budget most; one without a number is worse, one on a broken input not as bad."""
 
-    def badness(v: Verdict) -> tuple[bool, bool, Fraction]:
-        over = v.error / max(v.test.result.ulp, 1) if v.error is not None and v.test.result else Fraction(0)
-        return not v.passed, not v.passed and v.error is None, over
+    def badness(v: Verdict) -> tuple[bool, bool, bool, fmpq]:
+        over = v.error / max(v.test.result.ulp, 1) if v.error is not None and v.test.result else fmpq(0)
+        return not v.passed, not v.test.outcomes, not v.passed and v.error is None, over
 
     return max(verdicts, key=badness)
 
@@ -142,7 +143,7 @@ def readable(bits: Any, fmt: Format) -> Any:
         return "nan"
     if bits & (fmt.sign - 1) == fmt.infinity:
         return "-inf" if bits & fmt.sign else "inf"
-    return float(decode(bits, fmt))
+    return to_float(decode(bits, fmt))
 
 
 def hexed(bits: Any, fmt: Format) -> Any:

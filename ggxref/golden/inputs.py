@@ -5,8 +5,9 @@ only until they are rounded to the dtype.
 """
 
 from collections.abc import Mapping
-from fractions import Fraction
 from functools import cached_property
+
+from flint import fmpq
 
 from ggxref.golden.linear import (
     ONE,
@@ -29,7 +30,7 @@ from ggxref.golden.stream import Stream, hemisphere, root, unit
 def direction(s: Stream, fmt: Format, variant: str) -> Vector:
     """A direction; the variant says how far from the normal, and on which side."""
     x, y = s.circle()
-    small = s.scale(Fraction(1, 2**14), Fraction(1, 2**5))
+    small = s.scale(fmpq(1, 2**14), fmpq(1, 2**5))
     match variant:
         case "normal":
             return N
@@ -38,7 +39,7 @@ def direction(s: Stream, fmt: Format, variant: str) -> Vector:
         case "near":
             return unit(x * small, y * small, ONE)
         case "subnormal":
-            tiny = Fraction(2) ** (fmt.quantum + 2 + s.below(fmt.precision - 3))
+            tiny = fmpq(2) ** (fmt.quantum + 2 + s.below(fmt.precision - 3))
             return x * tiny, y * tiny, ONE
         case "grazing":
             return unit(x, y, small)
@@ -51,32 +52,34 @@ def direction(s: Stream, fmt: Format, variant: str) -> Vector:
     return hemisphere(s)
 
 
-def roughness(s: Stream, variant: str) -> tuple[Fraction, Fraction]:
+def roughness(s: Stream, variant: str) -> tuple[fmpq, fmpq]:
     """(alpha_x, alpha_y)."""
-    a, b = s.scale(Fraction(1, 50), 1), s.scale(Fraction(1, 50), 1)
+    a, b = s.scale(fmpq(1, 50), 1), s.scale(fmpq(1, 50), 1)
     match variant:
         case "small":
-            a, b = s.scale(Fraction(1, 10**4), Fraction(1, 10**3)), s.scale(Fraction(1, 10**4), Fraction(1, 10**3))
+            a, b = s.scale(fmpq(1, 10**4), fmpq(1, 10**3)), s.scale(fmpq(1, 10**4), fmpq(1, 10**3))
         case "isotropic":
             b = a
+        case "isotropic small":
+            a = b = s.scale(fmpq(1, 10**4), fmpq(1, 10**3))
         case "one":
             a, b = ONE, ONE
         case "above one":
-            a, b = s.uniform(1, 2), s.scale(Fraction(1, 4), 2)
+            a, b = s.uniform(1, 2), s.scale(fmpq(1, 4), 2)
         case "mild":
-            a = b * s.uniform(Fraction(5, 4), 4)
+            a = b * s.uniform(fmpq(5, 4), 4)
         case "extreme":
-            a = s.uniform(Fraction(1, 5), 2)
+            a = s.uniform(fmpq(1, 5), 2)
             b = a / s.uniform(500, 1000)
     return (a, b) if s.bits(1) else (b, a)
 
 
-def canonical(s: Stream, alpha: tuple[Fraction, Fraction], variant: str) -> Matrix:
+def canonical(s: Stream, alpha: tuple[fmpq, fmpq], variant: str) -> Matrix:
     """A canonical shape matrix: rows (C00, C10, 0), (0, C11, 0), (ex, ey, 1)."""
     x, y = s.circle()
     shear = s.uniform(-1, 1) * min(alpha)
-    skew = {"aligned": ZERO, "skew": s.uniform(Fraction(1, 20), 1), "strong": s.uniform(1, 4)}.get(
-        variant, s.uniform(0, Fraction(1, 4))
+    skew = {"aligned": ZERO, "skew": s.uniform(fmpq(1, 20), 1), "strong": s.uniform(1, 4)}.get(
+        variant, s.uniform(0, fmpq(1, 4))
     )
     if variant == "aligned":
         shear = ZERO
@@ -92,7 +95,7 @@ def rotation(s: Stream) -> Matrix:
         (2 * (b * c + a * d), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)),
         (2 * (b * d - a * c), 2 * (c * d + a * b), a * a - b * b - c * c + d * d),
     )
-    over = Fraction(1, n)
+    over = fmpq(1, n)
     return (xx * over, xy * over, xz * over), (yx * over, yy * over, yz * over), (zx * over, zy * over, zz * over)
 
 
@@ -100,19 +103,22 @@ def general(s: Stream, A: Matrix, variant: str) -> Matrix:
     """Another matrix of the same distribution, c Q A; for `negative` one with a negative determinant."""
     if variant == "aligned":
         return A
-    Q, c = rotation(s), s.scale(Fraction(1, 2), 2)
+    Q, c = rotation(s), s.scale(fmpq(1, 2), 2)
     x, y, z = product((Q[0], Q[1], minus(Q[2])) if variant == "negative" else Q, A)
     return combination(c, x, ZERO, x), combination(c, y, ZERO, y), combination(c, z, ZERO, z)
 
 
-def micronormal(s: Stream, fmt: Format, A: Matrix, wi: Vector, variant: str) -> Vector:
+def micronormal(s: Stream, fmt: Format, A: Matrix, wi: Vector, eta: fmpq, variant: str) -> Vector:
     """A normal of the ellipsoid of canonical `A`, by default one of the visible ones that a renderer meets."""
     match variant:
+        case "critical" if eta > 1:
+            cos = cosine(s, eta, "critical")
+            return combination(cos, wi, root(1 - cos * cos), unit(*cross(wi, hemisphere(s))))
         case "near" | "grazing" | "horizon" | "below" | "normal" | "subnormal":
             return direction(s, fmt, variant)
         case "perpendicular":
             p = unit(*cross(wi, hemisphere(s)))
-            tilt = s.scale(Fraction(1, 2**14), Fraction(1, 2**7)) * s.sign()
+            tilt = s.scale(fmpq(1, 2**14), fmpq(1, 2**7)) * s.sign()
             return unit(*combination(ONE, p if p[2] > 0 else minus(p), tilt, wi))
         case "tail":
             x, y = s.circle()
@@ -137,7 +143,7 @@ def outgoing(s: Stream, fmt: Format, wi: Vector, wm: Vector, variant: str) -> Ve
         case "same":
             return wi
         case "opposite":
-            return unit(*combination(-ONE, wi, s.scale(Fraction(1, 2**14), Fraction(1, 2**6)), hemisphere(s)))
+            return unit(*combination(-ONE, wi, s.scale(fmpq(1, 2**14), fmpq(1, 2**6)), hemisphere(s)))
     return direction(s, fmt, variant)
 
 
@@ -145,14 +151,14 @@ CORNERS = {
     "zero turn": {0: ZERO},
     "zero reach": {1: ZERO},
     "zero": {0: ZERO, 1: ZERO, 2: ZERO},
-    "quarter": {0: Fraction(1, 4)},
-    "half": {0: Fraction(1, 2), 1: Fraction(1, 2)},
+    "quarter": {0: fmpq(1, 4)},
+    "half": {0: fmpq(1, 2), 1: fmpq(1, 2)},
 }
 
 
-def numbers(s: Stream, fmt: Format, variant: str) -> tuple[Fraction, ...]:
+def numbers(s: Stream, fmt: Format, variant: str) -> tuple[fmpq, ...]:
     """Eight uniform numbers on the dtype's own grid in [0, 1); a variant puts some of the first three into a corner."""
-    step = Fraction(1, 1 << fmt.precision)
+    step = fmpq(1, 1 << fmt.precision)
     u = {i: s.below(1 << fmt.precision) * step for i in range(8)}
     corners = CORNERS | {
         "last turn": {0: 1 - step},
@@ -163,19 +169,19 @@ def numbers(s: Stream, fmt: Format, variant: str) -> tuple[Fraction, ...]:
     return tuple((u | corners.get(variant, {})).values())
 
 
-def index(s: Stream, variant: str) -> Fraction:
+def index(s: Stream, variant: str) -> fmpq:
     """An index of refraction, or the ratio of two."""
     match variant:
         case "one":
             return ONE
         case "near one":
-            return 1 + s.sign() * s.scale(Fraction(1, 2**12), Fraction(1, 2**7))
+            return 1 + s.sign() * s.scale(fmpq(1, 2**12), fmpq(1, 2**7))
         case "dense":
-            return s.uniform(Fraction(6, 5), Fraction(5, 2))
-    return s.scale(Fraction(1, 2), 3)
+            return s.uniform(fmpq(6, 5), fmpq(5, 2))
+    return s.scale(fmpq(1, 2), 3)
 
 
-def cosine(s: Stream, eta: Fraction, variant: str) -> Fraction:
+def cosine(s: Stream, eta: fmpq, variant: str) -> fmpq:
     """A cosine of incidence; `critical` is just beside total reflection at `eta`."""
     match variant:
         case "zero":
@@ -183,17 +189,17 @@ def cosine(s: Stream, eta: Fraction, variant: str) -> Fraction:
         case "one":
             return ONE
         case "grazing":
-            return s.scale(Fraction(1, 2**14), Fraction(1, 2**5))
+            return s.scale(fmpq(1, 2**14), fmpq(1, 2**5))
         case "negative":
             return -s.uniform(0, 1)
         case "critical" if eta > 1:
-            return root(1 - 1 / (eta * eta)) * (1 + s.sign() * s.scale(Fraction(1, 2**10), Fraction(1, 2**6)))
+            return root(1 - 1 / (eta * eta)) * (1 + s.sign() * s.scale(fmpq(1, 2**13), fmpq(1, 2**8)))
         case "total" if eta > 1:
             return root(1 - 1 / (eta * eta)) * s.uniform(0, 1)
     return s.uniform(0, 1)
 
 
-def part(s: Stream, variant: str) -> Fraction:
+def part(s: Stream, variant: str) -> fmpq:
     """A share in [0, 1], such as a masking term or a reflectance."""
     return {"zero": ZERO, "one": ONE}.get(variant, s.uniform(0, 1))
 
@@ -214,7 +220,7 @@ class Draw:
         return self._theme.get(quantity, "plain")
 
     @cached_property
-    def alpha(self) -> tuple[Fraction, Fraction]:
+    def alpha(self) -> tuple[fmpq, fmpq]:
         return roughness(self._stream("alpha"), self._variant("alpha"))
 
     @cached_property
@@ -231,78 +237,78 @@ class Draw:
 
     @cached_property
     def wm(self) -> Vector:
-        return micronormal(self._stream("wm"), self._fmt, self._canonical, self.wi, self._variant("wm"))
+        return micronormal(self._stream("wm"), self._fmt, self._canonical, self.wi, self.eta, self._variant("wm"))
 
     @cached_property
     def wo(self) -> Vector:
         return outgoing(self._stream("wo"), self._fmt, self.wi, self.wm, self._variant("wo"))
 
     @cached_property
-    def slope(self) -> tuple[Fraction, Fraction]:
+    def slope(self) -> tuple[fmpq, fmpq]:
         x, y, z = self.wm
         return (-x / z, -y / z) if z else (ZERO, ZERO)
 
     @cached_property
-    def mean(self) -> tuple[Fraction, Fraction]:
+    def mean(self) -> tuple[fmpq, fmpq]:
         ex, ey, _ = self._canonical[2]
         return -ex, -ey
 
     @cached_property
-    def scatter(self) -> tuple[tuple[Fraction, Fraction], tuple[Fraction, Fraction]]:
+    def scatter(self) -> tuple[tuple[fmpq, fmpq], tuple[fmpq, fmpq]]:
         (c00, c10, _), (_, c11, _), _ = self._canonical
         return (c00 * c00, c00 * c10), (c00 * c10, c10 * c10 + c11 * c11)
 
     @cached_property
-    def angles(self) -> tuple[Fraction, ...]:
+    def angles(self) -> tuple[fmpq, ...]:
         s = self._stream("angles")
         return (ZERO,) * 3 if self._variant("angles") == "zero" else tuple(s.uniform(-3, 3) for _ in range(3))
 
     @cached_property
-    def rows(self) -> tuple[tuple[Fraction, ...], ...]:
+    def rows(self) -> tuple[tuple[fmpq, ...], ...]:
         u = numbers(self._stream("u"), self._fmt, self._variant("u"))
         return u[0:2], u[2:4], u[4:6], u[6:8]
 
     @cached_property
-    def u(self) -> tuple[Fraction, ...]:
+    def u(self) -> tuple[fmpq, ...]:
         return self.rows[0]
 
     @cached_property
-    def u3(self) -> tuple[Fraction, ...]:
+    def u3(self) -> tuple[fmpq, ...]:
         return *self.rows[0], self.rows[1][0]
 
     @cached_property
-    def eta(self) -> Fraction:
+    def eta(self) -> fmpq:
         return index(self._stream("eta"), self._variant("eta"))
 
     @cached_property
-    def n_o(self) -> Fraction:
+    def n_o(self) -> fmpq:
         return index(self._stream("n_o"), "plain")
 
     @cached_property
-    def n_i(self) -> Fraction:
+    def n_i(self) -> fmpq:
         return self.n_o * self.eta
 
     @cached_property
-    def cos_i(self) -> Fraction:
+    def cos_i(self) -> fmpq:
         return cosine(self._stream("cos_i"), self.eta, self._variant("cos_i"))
 
     @cached_property
-    def k(self) -> Fraction:
-        return ZERO if self._variant("k") == "zero" else self._stream("k").scale(Fraction(1, 16), 8)
+    def k(self) -> fmpq:
+        return ZERO if self._variant("k") == "zero" else self._stream("k").scale(fmpq(1, 16), 8)
 
     @cached_property
-    def gamma(self) -> Fraction:
-        return Fraction(2) if self._variant("gamma") == "two" else 1 + self._stream("gamma").scale(Fraction(1, 4), 16)
+    def gamma(self) -> fmpq:
+        return fmpq(2) if self._variant("gamma") == "two" else 1 + self._stream("gamma").scale(fmpq(1, 4), 16)
 
     @cached_property
-    def size(self) -> Fraction:
-        return self._stream("size").scale(Fraction(1, 4), 4)
+    def size(self) -> fmpq:
+        return self._stream("size").scale(fmpq(1, 4), 4)
 
     @cached_property
-    def D(self) -> Fraction:
-        return self._stream("D").scale(Fraction(1, 2**8), 2**8)
+    def D(self) -> fmpq:
+        return self._stream("D").scale(fmpq(1, 2**8), 2**8)
 
-    def __getattr__(self, quantity: str) -> Fraction:
+    def __getattr__(self, quantity: str) -> fmpq:
         """The shares: masking terms and reflectances."""
         if quantity not in {"g1_i", "g1_o", "G2", "F", "f0"}:
             raise AttributeError(quantity)

@@ -1,14 +1,14 @@
 """Vectors and matrices of exact numbers, as tuples."""
 
-from fractions import Fraction
+from flint import fmpq
 
-Vector = tuple[Fraction, Fraction, Fraction]
+Vector = tuple[fmpq, fmpq, fmpq]
 Matrix = tuple[Vector, Vector, Vector]
-ZERO, ONE = Fraction(0), Fraction(1)
+ZERO, ONE = fmpq(0), fmpq(1)
 N: Vector = (ZERO, ZERO, ONE)
 
 
-def dot(a: Vector, b: Vector) -> Fraction:
+def dot(a: Vector, b: Vector) -> fmpq:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -34,11 +34,11 @@ def cofactor(A: Matrix) -> Matrix:
     return cross(A[1], A[2]), cross(A[2], A[0]), cross(A[0], A[1])
 
 
-def determinant(A: Matrix) -> Fraction:
+def determinant(A: Matrix) -> fmpq:
     return dot(A[0], cross(A[1], A[2]))
 
 
-def combination(a: Fraction, x: Vector, b: Fraction, y: Vector) -> Vector:
+def combination(a: fmpq, x: Vector, b: fmpq, y: Vector) -> Vector:
     """a x + b y."""
     return a * x[0] + b * y[0], a * x[1] + b * y[1], a * x[2] + b * y[2]
 

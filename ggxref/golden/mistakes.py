@@ -1,9 +1,8 @@
 """Mistakes that people make. Of two that explain the answers alike, the first is named."""
 
-from fractions import Fraction
 from typing import Any
 
-from flint import arb
+from flint import arb, fmpq
 
 from ggxref.golden import linear
 from ggxref.golden.linear import determinant, minus, transposed
@@ -30,7 +29,7 @@ from ggxref.golden.stream import root
 from ggxref.oracle.linalg import dot
 
 DENSITIES = "ndf. pdf slopes.ggx slopes.beckmann slopes.student slopes.ellipsoid slopes.visible"
-ONE = Fraction(1)
+ONE = fmpq(1)
 
 
 def _front(w: Any, wm: Any) -> bool:
@@ -147,7 +146,7 @@ def _alpha(name: str, sentence: str, change: Any) -> Mutant:
     return Mutant(name, sentence, on("alpha", change))
 
 
-def _clamp(least: Fraction) -> Any:
+def _clamp(least: fmpq) -> Any:
     return lambda a: (max(a[0], least), max(a[1], least))
 
 
@@ -166,8 +165,8 @@ MUTANTS: list[Mutant] = [
     _alpha("axes_swapped", "alpha_x and alpha_y are swapped", lambda a: (a[1], a[0])),
     _alpha("alpha_x_for_both", "alpha_x is used for both axes", lambda a: (a[0], a[0])),
     _alpha("alpha_y_for_both", "alpha_y is used for both axes", lambda a: (a[1], a[1])),
-    _alpha("alpha_clamped_1e-3", "alpha is clamped at 1e-3 from below", _clamp(Fraction(1, 1000))),
-    _alpha("alpha_clamped_6.4e-3", "alpha is clamped at 6.4e-3 from below", _clamp(Fraction(64, 10000))),
+    _alpha("alpha_clamped_1e-3", "alpha is clamped at 1e-3 from below", _clamp(fmpq(1, 1000))),
+    _alpha("alpha_clamped_6.4e-3", "alpha is clamped at 6.4e-3 from below", _clamp(fmpq(64, 10000))),
     _alpha("alpha_clamped_1", "alpha is clamped to 1 from above", lambda a: (min(a[0], ONE), min(a[1], ONE))),
     _alpha("alpha_doubled", "alpha is twice too large", lambda a: (2 * a[0], 2 * a[1])),
     Mutant("matrix_transposed", "A is transposed", on("A", transposed)),
@@ -195,14 +194,18 @@ MUTANTS: list[Mutant] = [
     _u("u_swapped", "u[0] and u[1] are swapped", lambda u: (u[1], u[0], *u[2:])),
     _u("reach_reversed", "u[1] is used as 1 - u[1]", lambda u: (u[0], 1 - u[1], *u[2:])),
     _u("azimuth_reversed", "u[0] is used as 1 - u[0]", lambda u: (1 - u[0], *u[1:])),
-    _u("azimuth_opposite", "the azimuth is off by half a turn", lambda u: ((u[0] + Fraction(1, 2)) % 1, *u[1:])),
+    _u(
+        "azimuth_opposite",
+        "the azimuth is off by half a turn",
+        lambda u: (u[0] + fmpq(1, 2) - (u[0] >= fmpq(1, 2)), *u[1:]),
+    ),
     Mutant("eta_inverted", "the ratio of the indices is upside down", on("eta", lambda eta: 1 / eta)),
     Mutant(
         "indices_swapped",
         "n_i and n_o are swapped",
         together(lambda v: {"n_i": v["n_o"], "n_o": v["n_i"]}, "n_i", "n_o"),
     ),
-    Mutant("absorption_ignored", "the imaginary part of the index is ignored", on("k", lambda k: Fraction(0))),
+    Mutant("absorption_ignored", "the imaginary part of the index is ignored", on("k", lambda k: fmpq(0))),
     Mutant("gamma_shifted", "gamma is off by one", on("gamma", lambda gamma: gamma + 1)),
     Mutant("transmission_by_F", "F stands for 1 - F", on("F", lambda F: 1 - F, "btdf")),
     _factor("pi_missing", "pi is missing under the fraction", arb.pi, DENSITIES),

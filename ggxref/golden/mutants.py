@@ -2,10 +2,9 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
-from flint import arb
+from flint import arb, fmpq
 
 from ggxref.golden.cases import mapped
 from ggxref.golden.catalogue import Function
@@ -151,11 +150,11 @@ def third_column(A: Matrix) -> arb:
     return sum((e * e for e in exact(transposed(A)[2])), arb(0)).sqrt()
 
 
-def geometric_mean(a: tuple[Fraction, Fraction]) -> tuple[Fraction, Fraction]:
+def geometric_mean(a: tuple[fmpq, fmpq]) -> tuple[fmpq, fmpq]:
     mean = root(a[0] * a[1])
     return mean, mean
 
 
-def raised(w: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
+def raised(w: tuple[fmpq, ...]) -> tuple[fmpq, ...]:
     """The direction's mirror image above the horizon."""
     return w[0], w[1], abs(w[2])

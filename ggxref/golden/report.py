@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ggxref.golden.grade import Grade, hexed, readable, worst
+from ggxref.golden.rounding import to_float
 from ggxref.golden.verdict import Verdict
 
 
@@ -21,7 +22,7 @@ def show(grade: Grade, again: str) -> None:
 
 
 def ulps(v: Verdict) -> str:
-    return v.remark or "no number" if v.error is None else f"{float(v.error):.3g}"
+    return v.remark or "no number" if v.error is None else f"{to_float(v.error):.3g}"
 
 
 def budget(v: Verdict) -> str:
@@ -133,7 +134,7 @@ def numbers(verdicts: Sequence[Verdict]) -> dict[str, Any]:
         "worst": {
             "id": v.test.id,
             "dtype": v.test.fmt.name,
-            "ulp": None if v.error is None else float(v.error),
+            "ulp": None if v.error is None else to_float(v.error),
             "allowed": v.test.result.ulp if v.test.result else None,
             "remark": v.remark,
             "passed": v.passed,
@@ -170,7 +171,9 @@ def cell(verdicts: Sequence[Verdict]) -> str:
     if not verdicts:
         return "<td></td>"
     failed = sum(not v.passed for v in verdicts)
-    # From green over yellow to red; a single failure must show.
-    hue = 120 if not failed else 50 - round(50 * failed / len(verdicts))
-    title = f"{failed} of {len(verdicts)} fail, worst {ulps(worst(verdicts))} ulp"
-    return f'<td class="n" style="background:hsl({hue},70%,70%)" title="{escape(title)}">{failed or ""}</td>'
+    # From pale green over yellow to a darker red, so that it reads in grey too; a single failure must show.
+    share = failed / len(verdicts)
+    colour = f"{50 - 50 * share:.0f},75%,{80 - 25 * share:.0f}%" if failed else "120,60%,93%"
+    bad = worst(verdicts)
+    title = f"{failed} of {len(verdicts)} fail, worst {ulps(bad)}{'' if bad.error is None else ' ulp'}"
+    return f'<td class="n" style="background:hsl({colour})" title="{escape(title)}">{failed or ""}</td>'

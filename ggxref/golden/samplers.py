@@ -207,9 +207,11 @@ _GRADIENTS = {
     "sampling.normals.pdf_beckmann": ("wm", "alpha"),
     "sampling.slope_beckmann.pdf": ("wm", "alpha"),
     "sampling.v_cavity.pdf.ggx": ("wm", "alpha"),
+    "sampling.v_cavity.pdf.beckmann": ("wm", "alpha"),
     "sampling.spherical_cap.pdf": ("wm", "alpha"),
     "sampling.bounded_cap.pdf": ("wm", "alpha"),
     "sampling.lune.pdf": ("wm", "A"),
+    "sampling.ellipsoid_bounded.pdf": ("wm", "A"),
 }
 _ALL += [gradient(f, argument) for f in _ALL for argument in _GRADIENTS.get(f.id, ())]
 FUNCTIONS: dict[str, Function] = {function.id: function for function in _ALL}

@@ -2,7 +2,8 @@
 
 import hashlib
 import math
-from fractions import Fraction
+
+from flint import fmpq
 
 from ggxref.golden.linear import Vector
 
@@ -24,15 +25,15 @@ class Stream:
         """An integer in [0, n); its bias is below 2^-190 for n < 2^60."""
         return self.bits(256) * n >> 256
 
-    def uniform(self, low: Fraction | int = 0, high: Fraction | int = 1) -> Fraction:
+    def uniform(self, low: fmpq | int = 0, high: fmpq | int = 1) -> fmpq:
         """A multiple of 2^-64 of the interval [low, high)."""
-        low, high = Fraction(low), Fraction(high)
-        return low + (high - low) * Fraction(self.bits(64), 1 << 64)
+        low, high = fmpq(low), fmpq(high)
+        return low + (high - low) * fmpq(self.bits(64), 1 << 64)
 
-    def scale(self, low: Fraction | int, high: Fraction | int) -> Fraction:
+    def scale(self, low: fmpq | int, high: fmpq | int) -> fmpq:
         """Between `low` and `high`, as much of it in each octave: 2^k (1 + f), k and f uniform."""
-        low, high = Fraction(low), Fraction(high)
-        octaves = math.ceil(Fraction(high / low)).bit_length()
+        low, high = fmpq(low), fmpq(high)
+        octaves = math.ceil(fmpq(high / low)).bit_length()
         while True:
             x = low * 2 ** self.below(octaves) * self.uniform(1, 2)
             if x < high:
@@ -41,20 +42,20 @@ class Stream:
     def sign(self) -> int:
         return 1 - 2 * self.bits(1)
 
-    def circle(self) -> tuple[Fraction, Fraction]:
+    def circle(self) -> tuple[fmpq, fmpq]:
         """A rational point on the unit circle, in every octant alike: from the tangent of half the angle."""
-        t = self.uniform(-1, 1) * Fraction(27, 64)  # half of at least an eighth of a turn: tan(pi/8) < 27/64
+        t = self.uniform(-1, 1) * fmpq(27, 64)  # half of at least an eighth of a turn: tan(pi/8) < 27/64
         c, s = (1 - t * t) / (1 + t * t), 2 * t / (1 + t * t)
         return ((c, s), (-s, c), (-c, -s), (s, -c))[self.bits(2)]
 
 
-def root(x: Fraction) -> Fraction:
+def root(x: fmpq) -> fmpq:
     """Square root of a positive fraction to 128 bits or more, by integers alone."""
     shift = 256 + 2 * max(x.denominator.bit_length() - x.numerator.bit_length(), 0)
-    return Fraction(math.isqrt((x.numerator << shift) // x.denominator), 1 << (shift // 2))
+    return fmpq(math.isqrt((x.numerator << shift) // x.denominator), 1 << (shift // 2))
 
 
-def unit(x: Fraction, y: Fraction, z: Fraction) -> Vector:
+def unit(x: fmpq, y: fmpq, z: fmpq) -> Vector:
     """The vector divided by its length (to 128 bits)."""
     length = root(x * x + y * y + z * z)
     return x / length, y / length, z / length

@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from fractions import Fraction
 from itertools import product as pairs
 from typing import Any
+
+from flint import fmpq
 
 from ggxref.golden.cases import Case
 from ggxref.golden.linear import dot
@@ -16,7 +17,7 @@ class Stressed:
     """A case with its exact result: fractions, or None where a component is infinite."""
 
     case: Case
-    result: tuple[Fraction | None, ...]
+    result: tuple[fmpq | None, ...]
 
     @property
     def fmt(self) -> Format:
@@ -33,7 +34,7 @@ class Stressed:
         """Each such direction with each micronormal."""
         return pairs(self.seen(), self.given("wm"))
 
-    def indices(self) -> Fraction | None:
+    def indices(self) -> fmpq | None:
         """n_i / n_o of a transparent interface."""
         if k := self.given("k"):  # a metal's index is the inverse ratio
             return None if k[0] else 1 / self.given("eta")[0]
@@ -42,7 +43,7 @@ class Stressed:
         n = self.given("n_i") + self.given("n_o")
         return n[0] / n[1] if len(n) == 2 else None
 
-    def cosines(self) -> list[Fraction]:
+    def cosines(self) -> list[fmpq]:
         """Squared cosines of incidence on the microfacet."""
         return [c * c for c in self.given("cos_i")] + [
             dot(w, m) ** 2 / (dot(w, w) * dot(m, m)) for w, m in pairs(self.given("wi"), self.given("wm"))

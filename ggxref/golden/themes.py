@@ -15,6 +15,7 @@ PLAIN: Theme = {}
 
 THEMES: list[Theme] = [
     {"alpha": "isotropic"},
+    {"alpha": "isotropic small"},
     {"alpha": "small"},
     {"alpha": "one"},
     {"alpha": "above one"},
@@ -93,6 +94,7 @@ THEMES: list[Theme] = [
     {"cos_i": "grazing"},
     {"cos_i": "negative"},
     {"cos_i": "critical", "eta": "dense"},
+    {"wm": "critical", "eta": "dense"},
     {"cos_i": "total", "eta": "dense"},
     {"cos_i": "zero", "eta": "one"},
     {"k": "zero"},

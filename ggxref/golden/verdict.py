@@ -1,8 +1,9 @@
 """The verdict on one answer to one test."""
 
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
+
+from flint import fmpq
 
 from ggxref.golden.cases import leaves, mapped
 from ggxref.golden.compare import distance, value
@@ -20,7 +21,7 @@ class Verdict:
 
     test: Test
     got: Any
-    error: Fraction | None
+    error: fmpq | None
     passed: bool
     # What the pass rests on, or what is wrong that no number tells.
     remark: str = ""
@@ -58,7 +59,7 @@ def unflushed(answer: Any, right: Any, fmt: Format) -> Any:
     """The answer with its zeros replaced by the right number where that is small enough to have been flushed."""
     if isinstance(answer, tuple):
         return tuple(unflushed(a, r, fmt) for a, r in zip(answer, right, strict=True))
-    small = abs(value(right, fmt)) < Fraction(2) ** (fmt.emin + FLUSH_MARGIN)
+    small = abs(value(right, fmt)) < fmpq(2) ** (fmt.emin + FLUSH_MARGIN)
     return right if small and answer in (0, fmt.sign) else answer
 
 

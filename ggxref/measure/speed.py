@@ -70,15 +70,19 @@ def interleaved(
     seconds: float = 2.0,
     compilation: dict[str, float] | None = None,
 ) -> list[Timing]:
-    """Run all subjects in turn, again and again, for about `seconds` in all (at least 5 rounds)."""
+    """Run all subjects in turn, again and again, for about `seconds` in all (at least 5 rounds).
+
+    Each round has an order of its own: threads that spin after their work would always slow the same next subject.
+    """
     for call in subjects.values():
         call()
+    order, rng = list(subjects), np.random.default_rng(0)
     times: dict[str, list[float]] = {name: [] for name in subjects}
     end = time.perf_counter() + seconds
     while time.perf_counter() < end or len(next(iter(times.values()))) < 5:
-        for name, call in subjects.items():
+        for name in rng.permutation(order).tolist():
             start = time.perf_counter()
-            call()
+            subjects[name]()
             times[name].append((time.perf_counter() - start) / points * 1e9)
     rows = []
     for name, t in times.items():

@@ -46,6 +46,10 @@ def exact(x: Any) -> Any:
     """
     if isinstance(x, str | arb):
         return x
+    if isinstance(x, fmpq):
+        return arb(x.p) / arb(x.q)
+    if isinstance(x, tuple):  # before the general test, which is slow
+        return tuple([exact(part) for part in x])
     if hasattr(x, "tolist"):  # NumPy scalars and arrays
         # bfloat16 and its kin give themselves back from `tolist`, but are exact as a float.
         plain = x.tolist()
@@ -56,8 +60,6 @@ def exact(x: Any) -> Any:
         return arb(x.numerator) / x.denominator
     if isinstance(x, int | fmpz):
         return arb(x)
-    if isinstance(x, fmpq):
-        return arb(x.p) / arb(x.q)
     if isinstance(x, float):
         if not math.isfinite(x):
             raise ValueError(f"the oracle takes finite numbers, got {x}")
