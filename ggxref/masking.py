@@ -11,13 +11,13 @@ import jax.numpy as jnp
 from ggxref import stable
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import sigma as sigma_ellipsoid
-from ggxref.slopes import gaussian_area, sigma_beckmann, sigma_ggx
+from ggxref.slopes import gaussian_tail, sigma_beckmann, sigma_ggx
 
 
 @stable.widened
 def lambda_ggx(w: Vec3, alpha: Vec2) -> Scalar:
     r"""$\Lambda = (-1 + \sqrt{1 + (\alpha_x^2 x^2 + \alpha_y^2 y^2)/z^2})/2$; infinite at the horizon. tokuyoshi2024."""
-    square = (alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2
+    square = stable.scaled_square(w, alpha)
     z = jnp.abs(w[2])
     return square / (2 * z * (z + stable.sqrt(square + z * z)))  # -1 + sqrt(1 + a²) cancels for small a
 
@@ -28,7 +28,8 @@ def lambda_beckmann(w: Vec3, alpha: Vec2) -> Scalar:
 
     Smith 1967, in heitz2014 §2.1.
     """
-    return gaussian_area(w, alpha) / jnp.abs(w[2])
+    s, tail = gaussian_tail(w, alpha)
+    return tail * (s / (2 * jnp.abs(w[2])))  # s tail may underflow where Λ does not
 
 
 def _front(w, wm):

@@ -90,13 +90,13 @@ def sigma_ggx(w: Vec3, alpha: Vec2) -> Scalar:
     return jnp.where(below, square / jnp.where(below, t - w[2], 1), t + w[2]) / 2
 
 
-def gaussian_area(w, alpha):
-    """`s ierfc(|z|/s) / 2`, s = ‖(αx x, αy y)‖: |z| Λ(w) for Beckmann slopes; 0 at normal incidence."""
-    square = (alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2
+def gaussian_tail(w, alpha):
+    """`s = ‖(αx x, αy y)‖` and `ierfc(|z|/s)`, which is 0 at normal incidence: |z| Λ(w) is half their product."""
+    square = stable.scaled_square(w, alpha)
     s = jnp.sqrt(jnp.where(square > 0, square, 1))
     # From 30 on, ierfc is 0 in every dtype; the limit only stops the overflow of z/s at normal incidence.
     a = jnp.minimum(jnp.abs(w[2]), 30 * s) / s
-    return jnp.where(square > 0, s * stable.ierfc(a) / 2, 0)
+    return s, jnp.where(square > 0, stable.ierfc(a), 0)
 
 
 @stable.widened
@@ -105,7 +105,8 @@ def sigma_beckmann(w: Vec3, alpha: Vec2) -> Scalar:
 
     Underflows to 0 far below the horizon, where no slope is steep enough to be seen. heitz2014 §5.1 (c).
     """
-    return jnp.maximum(w[2], 0) + gaussian_area(w, alpha)
+    s, tail = gaussian_tail(w, alpha)
+    return jnp.maximum(w[2], 0) + s * tail / 2
 
 
 def _visible(slope, wi, sigma):

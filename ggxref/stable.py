@@ -147,6 +147,25 @@ def stretched_square(w: Vec3, alpha: Vec2) -> Scalar:
     return _stretched_square(w[0], w[1], w[2], alpha[0], alpha[1])
 
 
+@widened
+def scaled_square(w: Vec3, alpha: Vec2) -> Scalar:
+    r"""$\alpha_x^2 x^2 + \alpha_y^2 y^2$, rounded once: plainly, half of Λ's error."""
+    return _scaled_square(w[0], w[1], alpha[0], alpha[1])
+
+
+@jax.custom_jvp
+def _scaled_square(x, y, ax, ay):
+    (p, p_rest), (q, q_rest) = _two_product(ax, x), _two_product(ay, y)
+    total, errors = _collected([_two_product(c, c) for c in (p, q)])
+    return total + (sum(errors) + 2 * (p * p_rest + q * q_rest))
+
+
+@_scaled_square.defjvp
+def _scaled_square_jvp(primals, tangents):
+    (x, y, ax, ay), (dx, dy, dax, day) = primals, tangents
+    return _scaled_square(*primals), 2 * (ax * x * (ax * dx + x * dax) + ay * y * (ay * dy + y * day))
+
+
 def _quotient(x, a):
     q = x / a
     p, error = _two_product(q, a)

@@ -5,8 +5,8 @@ import ml_dtypes
 import numpy as np
 import pytest
 
-from ggxref import ndf
-from ggxref.measure.accuracy import DTYPES, box, errors, in_units, measure
+from ggxref import masking, ndf
+from ggxref.measure.accuracy import DTYPES, box, compiled, errors, in_units, measure
 from ggxref.measure.reference import REFERENCES
 from ggxref.measure.regions import REGIONS, rounded
 from ggxref.measure.variants import QUANTITIES
@@ -95,3 +95,16 @@ def test_errors_leaves_out_what_has_no_finite_value():
     wm = np.asarray([[0.6], [0.0], [0.8]], np.float32)
     error, graded, faults = errors(lambda w: np.asarray([0.0], np.float32), lambda w: w[0] / 0.0, [wm], np.float32)
     assert not graded[0] and faults.inf == 0 and faults.nan == 0 and error.shape == (1,)
+
+
+def test_a_flushed_result_is_told_from_a_wrong_zero():
+    """Λ of Beckmann below the normal range comes out as 0, which is the hardware's; above it, it must not."""
+    reference = REFERENCES["masking.lambda_beckmann"]
+    w = np.asarray([[0.6, 0.6], [0.0, 0.0], [0.8, 0.8]], np.float32)
+    alpha = np.asarray([[0.15, 0.152], [0.1, 0.1]], np.float32)
+    error, graded, faults = errors(compiled(masking.lambda_beckmann), reference, [w, alpha], np.float32)
+    assert (faults.flushed, faults.wrong_zero) == (1, 0)
+    assert graded.tolist() == [False, True]
+    assert error[1] < 1000
+    _, _, faults = errors(lambda w, alpha: 0 * w[0], reference, [w, alpha], np.float32)
+    assert (faults.flushed, faults.wrong_zero) == (1, 1)

@@ -129,6 +129,19 @@ def test_stretched_square(dtype):
     assert jnp.isfinite(stable.stretched_square(jnp.zeros(3, dtype), jnp.ones(2, dtype)))
 
 
+def test_scaled_square(dtype):
+    """Rounded once; the plain form is not."""
+    w = perpendicular(dtype)[0]
+    alpha = np.exp(rng().uniform(-9, 1, (N, 2))).astype(dtype)
+
+    def square(x, y, ax, ay):
+        return (ax * x) ** 2 + (ay * y) ** 2
+
+    true = exact(square, *w[:, :2].T, *alpha.T)
+    assert ulps(jax.jit(jax.vmap(stable.scaled_square))(w, alpha), true, dtype) < 0.6
+    assert ulps(jax.jit(jax.vmap(lambda w, a: square(w[0], w[1], *a)))(w, alpha), true, dtype) > 1
+
+
 def test_log1p(dtype):
     x = rng().uniform(-0.999, 1, 4 * N).astype(dtype)
     assert ulps(jax.jit(jax.vmap(stable.log1p))(x), exact(lambda x: x.log1p(), x), dtype) < 3

@@ -48,6 +48,7 @@ class Accuracy:
     inf: int
     wrong_zero: int
     wrong_sign: int
+    flushed: int
 
 
 def arguments(function: Callable) -> tuple[str, ...]:
@@ -130,18 +131,22 @@ def _box(reference, block, dtype):
 
 @dataclass(frozen=True)
 class Faults:
-    """Results that no rounding explains."""
+    """Results that no rounding explains; `flushed` is the hardware's: 0 for an exact value below the normal range."""
 
-    nan: int
-    inf: int
-    wrong_zero: int
-    wrong_sign: int
+    nan: int = 0
+    inf: int = 0
+    wrong_zero: int = 0
+    wrong_sign: int = 0
+    flushed: int = 0
+
+    def __add__(self, other: "Faults") -> "Faults":
+        return Faults(*(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True)))
 
 
 def errors(run: Callable, reference: Callable, args, dtype) -> tuple[np.ndarray, np.ndarray, Faults]:
     """Error of each point, whether it is graded, and the faults. A fault's error is infinite.
 
-    Not graded: points whose exact value is infinite or beyond the dtype's range.
+    Not graded: points whose exact value is infinite or beyond the dtype's range, or was flushed.
     """
     computed, truth = run(*args).astype(np.float64), exact(reference, args)
     info = ml_dtypes.finfo(dtype)
@@ -153,8 +158,9 @@ def errors(run: Callable, reference: Callable, args, dtype) -> tuple[np.ndarray,
     sign = (computed * truth.hi < 0) & graded & scalar
     with np.errstate(invalid="ignore"):
         error = in_units((computed - truth.hi) - truth.lo, truth.hi, dtype)
-    flat = [f if scalar else f.any(0) for f in (nan, inf, zero, sign)]
-    graded = graded if scalar else graded.all(0)
+    flushed = (computed == 0) & (size > 0) & (size < float(info.smallest_normal)) & scalar
+    flat = [f if scalar else f.any(0) for f in (nan, inf, zero, sign, flushed)]
+    graded = graded & ~flushed if scalar else graded.all(0)
     error = np.where(flat[0] | flat[1], np.inf, error)
     return error, graded, Faults(*(int(f.sum()) for f in flat))
 
@@ -221,7 +227,7 @@ def measure(
     run, names = compiled(function), draws or arguments(function)
     chunk = min(count, 1 << 17)
     change = tied if isotropic else dict
-    every, kept, faults = [], [], Faults(0, 0, 0, 0)
+    every, kept, faults = [], [], Faults()
     for _ in range(0, count, chunk):
         drawn = change(rounded(REGIONS[region](rng, chunk), kind))
         args = [drawn[name] for name in names]
@@ -229,7 +235,7 @@ def measure(
         every.append(error[graded])
         top = np.argsort(np.where(graded, error, -1))[::-1][:EXAMINED]
         kept.append((error[top], [a[..., top] for a in args]))
-        faults = Faults(*(getattr(faults, f) + getattr(found, f) for f in ("nan", "inf", "wrong_zero", "wrong_sign")))
+        faults += found
     error = np.concatenate(every)
     top_error = np.concatenate([e for e, _ in kept])
     top = np.argsort(top_error)[::-1][:EXAMINED]
