@@ -34,13 +34,6 @@ def refract(w: Vec3, wm: Vec3, eta: Real) -> Vec3:
     return jnp.where(square >= 0, along * wm - eta * w, 0)
 
 
-def _sum(wi, wo, n_i, n_o):
-    """`n_i wi + n_o wo` for exactly unit directions: where they nearly cancel, what rounding added to the lengths is as
-    large as the sum.
-    """
-    return stable.dot((n_i, n_o, -n_i * stable.excess(wi), -n_o * stable.excess(wo)), (wi, wo, wi, wo))
-
-
 def half_reflection(wi: Vec3, wo: Vec3) -> Vec3:
     r"""The micronormal that reflects `wi` to `wo`: $\omega_h = (\omega_i + \omega_o)/\|\omega_i + \omega_o\|$.
 
@@ -48,7 +41,7 @@ def half_reflection(wi: Vec3, wo: Vec3) -> Vec3:
 
     dupuy2023 (6), walter2014 (4).
     """
-    return jnp.stack(stable.unit(*_sum(wi, wo, jnp.ones_like(wi[0]), jnp.ones_like(wi[0]))))
+    return stable.direction(*stable.unit_sum(wi, wo))
 
 
 def half_refraction(wi: Vec3, wo: Vec3, n_i: Real, n_o: Real) -> Vec3:
@@ -60,9 +53,8 @@ def half_refraction(wi: Vec3, wo: Vec3, n_i: Real, n_o: Real) -> Vec3:
 
     Walter et al. 2007 (16), used by heitz2014 §2.1.
     """
-    x, y, z = stable.unit(*_sum(wi, wo, jnp.asarray(n_i, wi.dtype), jnp.asarray(n_o, wi.dtype)))
-    sign = jnp.where(z < 0, -1, 1).astype(wi.dtype)
-    return jnp.stack([sign * x, sign * y, sign * z])
+    wm = stable.direction(*stable.unit_sum(wi, wo, n_i, n_o))
+    return jnp.where(wm[2] < 0, -wm, wm)
 
 
 def basis(w: Vec3) -> Mat3:
