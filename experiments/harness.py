@@ -23,7 +23,7 @@ def row(alpha, *, eta=1.5, k=0.0, f0=1.0, A=None) -> Rows:
     columns = {"alpha": alpha, "A": shape, "turn": (1.0, 0.0), "eta": eta, "k": k, "f0": f0, "albedo": 0.0}
     arrays = {name: jnp.asarray([column], jnp.float32) for name, column in columns.items()}
     number = jnp.zeros(1, jnp.int32)
-    return Rows(**arrays, g2=number, fresnel=number)
+    return Rows(**arrays, g2=number, fresnel=number, trigonometry=number, precision=number)
 
 
 def say(case: str, **numbers) -> None:

@@ -1,5 +1,7 @@
 """Shapes of the arrays that the public functions take and return."""
 
+from collections.abc import Callable
+
 from jax import Array
 from jaxtyping import Float
 
@@ -9,3 +11,6 @@ Vec2 = Float[Array, "2"]
 Vec3 = Float[Array, "3"]
 Mat2 = Float[Array, "2 2"]
 Mat3 = Float[Array, "3 3"]
+Turn = Callable[
+    [Scalar], tuple[Scalar, Scalar]
+]  # a form of (cos 2πu, sin 2πu): `stable.cos_sin_turn`, or a cheaper one

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from typer.core import TyperGroup
 
 from ggxref.errors import InputError
@@ -52,6 +52,20 @@ def _progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(what, total=total)
         yield lambda done: progress.advance(task, done)
+
+
+@contextmanager
+def _stages(total: int) -> Iterator[Callable[[str], None]]:
+    """A bar like `_progress` of unlike stages; calls say which one begins."""
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("", total=total, completed=-1)
+
+        def say(stage: str) -> None:
+            progress.update(task, description=stage)
+            progress.advance(task, 1)
+
+        yield say
 
 
 @app.command(epilog="Example: ggxref verify --paper walter2014 --equation 28 --json report.json")
@@ -283,8 +297,9 @@ def choose(
     if pictures and not pictures.parent.is_dir():
         raise InputError(f"--pictures: {pictures} cannot be written: there is no directory {pictures.parent}")
     console = Console()
-    with Console(stderr=True).status("reading") as status:
-        result = search.choose(read(scene), tolerance, lambda doing: status.update(f"rendering: {doing}"))
+    asked = read(scene)
+    with _stages(search.stages(asked)) as say:
+        result = search.choose(asked, tolerance, say)
     console.print(report.tables(result))
     if json:
         write_atomically(json, dumps(report.document(result), indent=1) + "\n")

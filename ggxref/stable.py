@@ -48,7 +48,7 @@ def widened(function: Callable) -> Callable:
 
     @functools.wraps(function)
     def in_float32(*args, **named):
-        numbers = args, {k: x for k, x in named.items() if not isinstance(x, str)}
+        numbers = args, {k: x for k, x in named.items() if not (isinstance(x, str) or callable(x))}
         dtype = jnp.result_type(*jax.tree.leaves(numbers))
         if dtype.itemsize > 2:
             return function(*args, **named)
@@ -264,14 +264,16 @@ def _horner(coefficients, x):
     return value
 
 
-def cos_sin_turn(u: Real) -> tuple[Scalar, Scalar]:
+def cos_sin_turn(u: Real, terms: int | None = None) -> tuple[Scalar, Scalar]:
     r"""$(\cos 2\pi u, \sin 2\pi u)$ for `u` in [0, 1].
 
     `u` is reduced to an eighth of a turn exactly, before the rounding of $\pi$ can enter; the polynomial that is left
     costs a fraction of the library's functions, which must reduce any argument.
+
+    - `terms`: of each Taylor series, at most 9; without it, as many as the dtype can hold.
     """
     u = jnp.asarray(u)
-    cos_terms, sin_terms = (9, 9) if u.dtype == jnp.float64 else (6, 5)
+    cos_terms, sin_terms = (terms, terms) if terms else (9, 9) if u.dtype == jnp.float64 else (6, 5)
     quarter = jnp.round(4 * u)
     v = u - quarter / 4
     square = v * v

@@ -5,7 +5,7 @@ import pytest
 
 from ggxref.errors import InputError
 from ggxref.scene import choose, read
-from ggxref.scene.compare import Deviation
+from ggxref.scene.compare import Batches, Deviation
 
 SCENE = """
 [view]
@@ -100,10 +100,33 @@ def test_sampler_follows_the_model(search):
     assert (chosen["skewed"].model, chosen["skewed"].sampler) == ("ellipsoid", "ellipsoid_cap")
 
 
+def test_what_costs_more_is_not_taken(search, monkeypatch):
+    """The separable form is within; at a fifth more than the richest it is not worth its error, at a hundredth less it is."""
+    for factor, expected in ((1.2, "height_correlated"), (0.99, "separable")):
+        cost = lambda self, name, choice, factor=factor: 100.0 * (factor if choice.g2 == "separable" else 1)  # noqa: E731
+        monkeypatch.setattr(choose._Search, "cost", cost)
+        assert settle(search[0](0.05))[0]["plain"].g2 == expected
+
+
+def test_rounds_of_the_search_are_counted(search):
+    """Nine options, two materials to find a sampler for, and the richest, the chosen together, the timing."""
+    assert choose.stages(search[0](0.1).scene) == 9 + 2 + 3
+
+
+def test_seconds_set_the_samples(tmp_path, monkeypatch):
+    """8 batches of 8 × 6 pixels at 1000 ns: 0.384 s is 1000 samples a pixel and batch."""
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE + "[budget]\nseconds = 0.384\n")
+    trial = Batches(np.zeros((8, 6, 8)), np.zeros((6, 8)), 1000.0)
+    monkeypatch.setattr(choose._Search, "_batches", lambda self, choices, samples: trial)
+    assert choose._Search(read.read(path), 0.1, print).samples == 1000
+
+
 def test_an_option_is_measured_for_all_materials_at_once(search):
     make, asked = search
     choose._steps(make(0.05))
-    assert len(asked) == 5  # isotropic, anisotropic, separable, one, schlick; not ten
+    # isotropic, anisotropic, separable, one, schlick, two forms of trigonometry, two precisions; not eighteen
+    assert len(asked) == 9
 
 
 @pytest.mark.parametrize("tolerance", [-0.1, np.nan, np.inf])

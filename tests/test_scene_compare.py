@@ -40,6 +40,12 @@ def test_equal_pictures_are_equal():
     assert (found.value, found.error) == (0.0, 0.0)
 
 
+def test_what_overflows_is_beyond_any_tolerance():
+    differences = np.zeros((BATCHES, PIXELS))
+    differences[1, 2] = np.nan
+    assert deviation(differences, 1.0).most == np.inf
+
+
 def test_one_batch_has_no_error():
     with pytest.raises(ValueError, match="two"):
         deviation(np.zeros((1, PIXELS)), 1.0)

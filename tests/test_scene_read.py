@@ -63,6 +63,9 @@ BAD = {
     "no direction": ("[0, 0, 2]", "[0, 0, 0]", ["lights[0].direction", "length 0"]),
     "from above": ("[0, -4, 1]", "[0, 0, 4]", ["view.origin", "upright"]),
     "not TOML": ("[view]", "[view", ["cannot be read as TOML"]),
+    "two budgets": ("[view]", "[budget]\nsamples = 9\nseconds = 1\n[view]", ["budget.seconds", "one of the two"]),
+    "no seconds": ("[view]", "[budget]\nseconds = 0\n[view]", ["budget.seconds", "(0, "]),
+    "too many": ("[view]", "[budget]\nsamples = 1000000\n[view]", ["budget.samples", "1000000 samples of 96 x 64"]),
     "no lights": ("[[lights]]", "[[lamps]]", ["lights"]),
 }
 

@@ -25,7 +25,7 @@ def row(alpha=(0.3, 0.5), g2=1, albedo=0.0, skew=(0.0, 0.0)):
     A[2, :2] = skew
     shape = {"alpha": f32([alpha]), "A": f32(A)[None], "turn": f32([[1.0, 0.0]])}
     single = {"eta": 1.5, "k": 0.0, "f0": 0.8, "albedo": albedo}
-    forms = {"g2": jnp.full(1, g2), "fresnel": jnp.zeros(1, jnp.int32)}
+    forms = dict.fromkeys(materials.FORMS, jnp.zeros(1, jnp.int32)) | {"g2": jnp.full(1, g2)}
     return Rows(**shape, **{name: f32([value]) for name, value in single.items()}, **forms)
 
 
@@ -119,6 +119,35 @@ def test_white_furnace_of_diffuse_is_one():
     # Light samples are exact only on average: a pixel's mean of 4096 has an error below 1 %.
     assert_allclose(p.mean, 1, atol=ERRORS * p.error.max())
     assert p.error.max() < 0.01
+
+
+@pytest.mark.slow
+def test_underside_has_the_same_microsurface():
+    """A surface with one material on both sides, seen from below with all directions reversed, looks as from above."""
+    kind, rows = replace(ROUGH, ndf="ellipsoid", sampler="ellipsoid_cap"), row(alpha=(0.3, 0.2), skew=(0.1, -0.3))
+    above, error_above = estimate(kind, rows, PLANE, (GRADIENT,))
+    reverse = lights.Sky(GRADIENT.top, GRADIENT.bottom)
+    camera = render.look(tuple(-4 * VIEW), (0, 0, 0), 1e-3, 4, 4)
+    p = render.render((kind,), render.World(camera, (PLANE,), (reverse,), (rows,)), render.Settings(4, 4, lanes=1 << 10),
+                      samples=4096, seed=1)  # fmt: skip
+    error = math.sqrt(p.variance.mean() / (16 * p.samples))
+    assert abs(p.mean.mean() - above) < ERRORS * math.hypot(error, error_above)
+    other, error_other = estimate(kind, row(alpha=(0.3, 0.2), skew=(0.1, 0.3)), PLANE, (GRADIENT,))
+    assert abs(other - above) > ERRORS * math.hypot(error_other, error_above)  # the skew can be told
+
+
+def test_batches_are_independent_pictures():
+    """Their mean is one picture's within errors, and no two are alike."""
+    batches = picture(Kind("diffuse", sampler=""), row(albedo=1.0), SPHERE, (WHITE,), fov=0.7, batches=3)
+    assert batches.mean.shape == (3, 4, 4)
+    assert_allclose(batches.mean, 1, atol=ERRORS * batches.error.max())
+    assert not np.isclose(batches.mean[0], batches.mean[1], atol=1e-7).all()
+
+
+def test_bounces_of_a_convex_ball():
+    """A ray that hits a convex ball sends one on, which leaves: two a path."""
+    ball = picture(Kind("diffuse", sampler=""), row(albedo=1.0), SPHERE, (WHITE,), fov=0.3)
+    assert_allclose(ball.bounces, 2)
 
 
 GLASS = Kind("dielectric", g2=("separable",))

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from ggxref import stable
-from ggxref._types import Real, Scalar, Vec2, Vec3
+from ggxref._types import Real, Scalar, Turn, Vec2, Vec3
 
 
 class Incident(NamedTuple):
@@ -44,14 +44,14 @@ def incident(x: Scalar, y: Scalar, z: Scalar) -> Incident:
     return Incident(x / norm, y / norm, z / norm, norm, rise, fall)
 
 
-def half_in_cap(u: Vec2, i: Incident, cut: Real) -> tuple[Scalar, Scalar, Scalar]:
+def half_in_cap(u: Vec2, i: Incident, cut: Real, turn: Turn = stable.cos_sin_turn) -> tuple[Scalar, Scalar, Scalar]:
     """`i + c` (not normalised) with `c` uniform on the cap `{z > cut - i.z}`, all in units of i's length.
 
     `cut = 0` is the whole cap of the reflections of the hemisphere (dupuy2023 listing 3); tokuyoshi2024's is
     `(1 - k) i.z`. The cap's height `1 + i.z - cut`, its complement to 2 and `c.z + i.z` are all formed without
     cancellation, so that half vectors keep z > 0 for every `u` in [0, 1).
     """
-    cos_phi, sin_phi = stable.cos_sin_turn(u[0])
+    cos_phi, sin_phi = turn(u[0])
     height, rest = i.rise - cut, i.fall + cut
     depth = u[1] * height  # 1 - c.z
     sin_theta = stable.sqrt(depth * ((1 - u[1]) * (i.rise + i.fall) + u[1] * rest))

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 
 from ggxref import ndf, slopes, stable
-from ggxref._types import Scalar, Vec2, Vec3
+from ggxref._types import Scalar, Turn, Vec2, Vec3
 from ggxref.ellipsoid import length
 from ggxref.sampling._sphere import half_in_cap, ray, unstretch
 
@@ -31,16 +31,17 @@ def bound(wi: Vec3, alpha: Vec2) -> Scalar:
 
 
 @stable.widened
-def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
+def sample(u: Vec2, wi: Vec3, alpha: Vec2, *, turn: Turn = stable.cos_sin_turn) -> Vec3:
     r"""As `spherical_cap.sample` with the cap $\{z > -k z_i'\}$: only for single reflection.
 
     - `u`: in [0, 1)², (2,). `wi`: unit, (3,), anywhere but straight below. `alpha`: positive, (2,).
+    - `turn`: the form of cos 2πu and sin 2πu.
     - Returns a micronormal with density `pdf`: unit, (3,), above the horizon.
 
     tokuyoshi2024.
     """
     i = ray(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
-    return unstretch(*half_in_cap(u, i, _bound_terms(wi, alpha)[1] * i.z), alpha)
+    return unstretch(*half_in_cap(u, i, _bound_terms(wi, alpha)[1] * i.z, turn), alpha)
 
 
 @stable.widened

@@ -9,7 +9,7 @@ $o_z' + i_z' \ge i_z/(\|A i\| \max_{\theta\le\theta_1} Q)$. At e = 0 and α ≤ 
 import jax.numpy as jnp
 
 from ggxref import ndf, stable
-from ggxref._types import Mat3, Scalar, Vec2, Vec3
+from ggxref._types import Mat3, Scalar, Turn, Vec2, Vec3
 from ggxref.ellipsoid import canonical, cofactor, length, times
 from ggxref.sampling._sphere import half_in_cap
 from ggxref.sampling.ellipsoid_cap import from_sphere, to_sphere
@@ -55,15 +55,16 @@ def bound(wi: Vec3, A: Mat3) -> Scalar:
 
 
 @stable.widened
-def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:
+def sample(u: Vec2, wi: Vec3, A: Mat3, *, turn: Turn = stable.cos_sin_turn) -> Vec3:
     """As `ellipsoid_cap.sample` with the cap's lower end at `bound`: only for single reflection.
 
     - `u`: in [0, 1)², (2,). `wi`: unit, (3,), anywhere but where A ω_i points straight below.
+    - `turn`: the form of cos 2πu and sin 2πu.
     - `A`: shape matrix, (3, 3), non-singular. Returns a micronormal with density `pdf`: unit, (3,), above the horizon.
     """
     A = canonical(A)
     i = to_sphere(wi, A)
-    return from_sphere(*half_in_cap(u, i, _cut(wi, i, A)), A)
+    return from_sphere(*half_in_cap(u, i, _cut(wi, i, A), turn), A)
 
 
 @stable.widened

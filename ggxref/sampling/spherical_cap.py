@@ -4,7 +4,8 @@ import math
 
 import jax.numpy as jnp
 
-from ggxref._types import Scalar, Vec2, Vec3
+from ggxref import stable
+from ggxref._types import Scalar, Turn, Vec2, Vec3
 from ggxref.ellipsoid import length
 from ggxref.sampling._sphere import half_in_cap, ray, unstretch
 from ggxref.sampling._visible import pdf_ggx as pdf
@@ -12,15 +13,16 @@ from ggxref.sampling._visible import pdf_ggx as pdf
 __all__ = ["cap_pdf", "pdf", "sample"]
 
 
-def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
+def sample(u: Vec2, wi: Vec3, alpha: Vec2, *, turn: Turn = stable.cos_sin_turn) -> Vec3:
     """Stretch `wi`, draw a direction of the cap `{z > -z_i}`, take the half vector, unstretch.
 
     - `u`: in [0, 1)², (2,). `wi`: unit, (3,), anywhere but straight below. `alpha`: positive, (2,).
+    - `turn`: the form of cos 2πu and sin 2πu.
     - Returns a micronormal with density `pdf`: unit, (3,), above the horizon.
 
     dupuy2023 listings 1 and 3.
     """
-    return unstretch(*half_in_cap(u, ray(alpha[0] * wi[0], alpha[1] * wi[1], wi[2]), 0), alpha)
+    return unstretch(*half_in_cap(u, ray(alpha[0] * wi[0], alpha[1] * wi[1], wi[2]), 0, turn), alpha)
 
 
 def cap_pdf(wo: Vec3, wi: Vec3) -> Scalar:

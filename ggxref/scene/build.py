@@ -23,7 +23,8 @@ class Choice:
     g2: str
     fresnel: str
     sampler: str
-    dtype: str = "float32"
+    trigonometry: str = "exact"
+    precision: str = "float32"
 
 
 def richest(material: Material) -> Choice:
@@ -57,15 +58,20 @@ def kind_of(material: Material, choice: Choice) -> Kind:
         return Kind("diffuse", sampler="", ndf="ggx")
     ndf = material.ndf if material.ndf == "beckmann" or choice.model != "ellipsoid" else "ellipsoid"
     fresnel = ("exact",) if material.surface == "dielectric" else (choice.fresnel,)
-    return Kind(material.surface, ndf, (choice.g2,), fresnel, choice.sampler, material.albedo > 0, choice.dtype)
+    turn = (choice.trigonometry,) if choice.sampler in materials.TURNING else ("exact",)
+    forms = (choice.g2,), fresnel, choice.sampler, material.albedo > 0, turn, (choice.precision,)
+    return Kind(material.surface, ndf, *forms)
 
 
 def any_form(kind: Kind) -> Kind:
-    """The kind with every G2 and Fresnel form, which the row chooses: one compilation for many comparisons."""
+    """The kind with every form, of which the row names one: one compilation for many comparisons."""
     if kind.surface == "diffuse":
         return kind
-    forms = materials.FRESNELS if kind.surface == "conductor" else ("exact",)
-    return replace(kind, g2=materials.G2S[:2], fresnel=forms)
+    fresnel = materials.FRESNELS if kind.surface == "conductor" else ("exact",)
+    turns = tuple(materials.TURNS) if kind.sampler in materials.TURNING else kind.trigonometry
+    return replace(
+        kind, g2=materials.G2S[:2], fresnel=fresnel, trigonometry=turns, precision=tuple(materials.PRECISIONS)
+    )
 
 
 def row(material: Material, choice: Choice, kind: Kind) -> tuple:
@@ -73,8 +79,8 @@ def row(material: Material, choice: Choice, kind: Kind) -> tuple:
     A, turn = plainer(material.A, choice.model)
     angle = material.turn + turn
     eta = 1.0 if math.isnan(material.eta) else material.eta
-    forms = [names.index(name) if name in names else 0 for names, name in
-             ((kind.g2, choice.g2), (kind.fresnel, choice.fresnel))]  # fmt: skip
+    of_kind, wanted = ([getattr(each, form) for form in materials.FORMS] for each in (kind, choice))
+    forms = [names.index(name) if name in names else 0 for names, name in zip(of_kind, wanted, strict=True)]
     turned = math.cos(angle), math.sin(angle)
     return A.diagonal()[:2], A, turned, eta, material.k, material.f0, material.albedo, *forms
 
@@ -82,13 +88,15 @@ def row(material: Material, choice: Choice, kind: Kind) -> tuple:
 def world(
     scene: Scene, choices: Mapping[str, Choice], *, by_row: bool = False
 ) -> tuple[tuple[Kind, ...], render.World]:
-    """The renderer's arguments for the scene with each material by its choice. `by_row`: see `any_form`."""
+    """The renderer's arguments for the scene with each material by its choice. `by_row`: see `any_form`.
+
+    Materials that differ in forms alone share a kind that has the forms of all: a second kind is a second branch.
+    """
+    alone = [kind_of(material, choices[material.name]) for material in scene.materials]
+    kinds = _united([any_form(kind) if by_row else kind for kind in alone])
     members: dict[Kind, list[tuple[str, tuple]]] = {}
-    for material in scene.materials:
-        choice = choices[material.name]
-        kind = kind_of(material, choice)
-        kind = any_form(kind) if by_row else kind
-        members.setdefault(kind, []).append((material.name, row(material, choice, kind)))
+    for material, kind in zip(scene.materials, kinds, strict=True):
+        members.setdefault(kind, []).append((material.name, row(material, choices[material.name], kind)))
     order = [name for rows in members.values() for name, _ in rows]
     tables = tuple(_rows([numbers for _, numbers in rows]) for rows in members.values())
     view = render.look(*scene.view, scene.width, scene.height)
@@ -96,9 +104,24 @@ def world(
     return tuple(members), render.World(view, things, tuple(_light(each) for each in scene.lights), tables)
 
 
+def formless(kind: Kind) -> Kind:
+    """What kinds share that differ in forms alone."""
+    return replace(kind, **dict.fromkeys(materials.FORMS, ()))
+
+
+def _united(kinds: list[Kind]) -> list[Kind]:
+    """Each kind, with the forms of all that differ from it in forms alone."""
+    found = []
+    for kind in kinds:
+        alike = [each for each in kinds if formless(each) == formless(kind)]
+        forms = {form: [name for each in alike for name in getattr(each, form)] for form in materials.FORMS}
+        found.append(replace(kind, **{form: tuple(dict.fromkeys(names)) for form, names in forms.items()}))
+    return found
+
+
 def _rows(rows: list[tuple]) -> Rows:
     columns = [np.array(column) for column in zip(*rows, strict=True)]
-    dtypes = [jnp.int32 if name in ("g2", "fresnel") else jnp.float32 for name in Rows._fields]
+    dtypes = [jnp.int32 if name in materials.FORMS else jnp.float32 for name in Rows._fields]
     return Rows(*(jnp.asarray(column, dtype) for column, dtype in zip(columns, dtypes, strict=True)))
 
 

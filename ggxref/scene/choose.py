@@ -1,13 +1,14 @@
 """The cheapest models with which a scene's picture stays within a tolerance of the richest ones'.
 
-Pruned, not exhaustive: if the plainest of everything is within, no more is asked. Else one picture for each option of each
-axis, in which every material that has the option takes it: a material's own pixels tell its own deviation. The options
-within the tolerance are then taken together and measured as one; what is too much is taken back, the largest first.
-Samplers do not move the expectation of a picture, and are chosen by cost alone.
+Pruned, not exhaustive: one picture for each option of each axis, in which every material that has the option takes it: a
+material's own pixels tell its own deviation. The options within the tolerance that are no dearer than the richest are
+taken together and measured as one; what is too much is taken back, the largest first. Samplers do not move the
+expectation of a picture, and are chosen by cost alone.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -15,13 +16,25 @@ from ggxref.errors import InputError
 from ggxref.scene import build, compare, materials, render
 from ggxref.scene.build import Choice
 from ggxref.scene.compare import Batches, Deviation
-from ggxref.scene.materials import BOUNDED, FRESNELS, G2S
-from ggxref.scene.read import Material, Scene
+from ggxref.scene.materials import BOUNDED, FRESNELS, G2S, PRECISIONS, TURNS
+from ggxref.scene.read import MOST, Material, Scene
 
-AXES = {"model": build.MODELS, "g2": G2S[:2], "fresnel": FRESNELS}
+AXES = {
+    "model": build.MODELS,
+    "g2": G2S[:2],
+    "fresnel": FRESNELS,
+    "trigonometry": tuple(TURNS),
+    "precision": tuple(PRECISIONS),
+}
 """Options of each axis, plainest first. V-cavities are another microsurface, not a plainer one."""
 COUNT = 8
 """Batches: enough for an error of the error of 27 %."""
+TRIAL = 8
+"""Samples a pixel and batch that tell how long a sample takes."""
+DEARER = 1.1
+"""Times the richest's cost: what an option may seem to cost and still be taken, as two timings of one program differ."""
+TURNS_OF_ALL = 3
+"""Times that the richest and the chosen picture are rendered in turn: the middle ratio of their costs counts."""
 MORE = 4
 """Once, that many times the samples where an answer is within its error of the tolerance."""
 
@@ -48,10 +61,18 @@ class Sampler:
     ns: float
     noise: float
 
+    @property
+    def effort(self) -> float:
+        """Time that a given error takes, up to a factor that the scene sets."""
+        return self.ns * self.noise
+
 
 @dataclass(frozen=True)
 class Result:
-    """`deviations`: of the chosen picture from the richest, per material; `faster`: at equal noise, whole pictures."""
+    """`deviations`: of the chosen picture from the richest, per material; `faster`: at equal noise, whole pictures.
+
+    `costs`: nanoseconds of a bounce's formulas with the richest, per material.
+    """
 
     scene: Scene
     tolerance: float
@@ -59,13 +80,14 @@ class Result:
     chosen: Choices
     steps: tuple[Step, ...]
     samplers: tuple[Sampler, ...]
+    costs: dict[str, float]
     deviations: dict[str, Deviation]
     pictures: dict[str, Batches]
     faster: float
 
 
 class _Search:
-    """Pictures of one scene, each rendered once."""
+    """Pictures of one scene, each rendered once. `say` is told what is done next."""
 
     def __init__(self, scene: Scene, tolerance: float, say: Callable[[str], None]):
         self.scene, self.tolerance, self.say = scene, tolerance, say
@@ -74,24 +96,32 @@ class _Search:
         self.richest = {name: build.richest(material) for name, material in self.named.items()}
         self.regions = {name: region for name, region in build.seen(scene).items() if region.any()}
         self._references: dict[int, Batches] = {}
-        self._costs: dict[materials.Kind, float] = {}
+        self._clock = compare.Clock()
+        self._costs: dict[Hashable, float] = {}
 
-    def _batches(self, choices: Choices, samples: int, *, by_row: bool) -> Batches:
+    def _batches(self, choices: Choices, samples: int, *, by_row: bool = True, seed: int = 0) -> Batches:
         kinds, world = build.world(self.scene, choices, by_row=by_row)
-        return compare.batches(kinds, world, self.settings, count=COUNT, samples=samples, seed=0)
+        return compare.batches(kinds, world, self.settings, count=COUNT, samples=samples, seed=seed)
+
+    @cached_property
+    def samples(self) -> int:
+        """Samples a pixel of a batch: those of the file, or what fits in its seconds."""
+        if not self.scene.seconds:
+            return max(self.scene.samples // COUNT, 2)
+        ns = self._batches(self.richest, TRIAL).ns_per_sample
+        pixels = self.scene.width * self.scene.height * COUNT
+        return min(max(int(self.scene.seconds * 1e9 / (ns * pixels)), 2), MOST // pixels)
 
     def _reference(self, samples: int) -> Batches:
         if samples not in self._references:
-            self._references[samples] = self._batches(self.richest, samples, by_row=True)
+            self._references[samples] = self._batches(self.richest, samples)
         return self._references[samples]
 
     def measure(self, choices: Choices) -> dict[str, Deviation]:
         """From the richest, per material; with more samples where the first leave it open."""
         found: dict[str, Deviation] = {}
-        few = max(self.scene.samples // COUNT, 2)
-        for samples in (few, MORE * few):
-            picture = self._batches(choices, samples, by_row=True)
-            found = compare.deviations(picture, self._reference(samples), self.regions)
+        for samples in (self.samples, MORE * self.samples):
+            found = compare.deviations(self._batches(choices, samples), self._reference(samples), self.regions)
             if not any(each.least < self.tolerance <= each.most for each in found.values()):
                 break
         return found
@@ -100,23 +130,50 @@ class _Search:
         """Strictly: within 0 is nothing, so tolerance 0 keeps the richest."""
         return deviation.most < self.tolerance
 
+    def takes(self, step: Step) -> bool:
+        return self.within(step.deviation) and step.ns <= DEARER * self.cost(step.material, self.richest[step.material])
+
     def options(self, material: Material, axis: str) -> tuple[str, ...]:
         """What is plainer than the material's richest on an axis."""
-        if material.surface == "diffuse" or (axis == "fresnel" and material.surface == "dielectric"):
+        fixed = {"dielectric": ("fresnel",), "diffuse": tuple(AXES)}.get(material.surface, ())
+        if axis in fixed or (axis == "trigonometry" and self.richest[material.name].sampler not in materials.TURNING):
             return ()
         every = AXES[axis]
         return every[: every.index(getattr(self.richest[material.name], axis))]
 
     def cost(self, name: str, choice: Choice) -> float:
-        kind = build.kind_of(self.named[name], choice)
-        if kind not in self._costs:
-            kinds, world = build.world(replace_materials(self.scene, self.named[name]), {name: choice})
-            self._costs[kind] = compare.shading_cost(kinds[0], world.rows[0])
-        return self._costs[kind]
+        """Of a bounce's formulas [ns]. Stored precision costs memory, not formulas.
 
-    def whole(self, choices: Choices) -> Batches:
-        """With the formulas compiled for these choices alone: what they cost."""
-        return self._batches(choices, max(self.scene.samples // COUNT, 2), by_row=False)
+        A form of G2, of Fresnel or of trigonometry is a small part, timed by itself: compiled with the rest, it would be
+        lost in what the compiler makes of the rest.
+        """
+        richest = self.richest[name]
+        forms = {axis: (getattr(richest, axis), getattr(choice, axis)) for axis in compare.USES}
+        richer = replace(choice, precision=richest.precision, **{axis: rich for axis, (rich, _) in forms.items()})
+        kind, (rows,) = self._kind(name, richer)
+        ns = self._once(kind, lambda: self._clock.bounce(kind, rows))
+        for axis, options in forms.items():
+            if len(set(options)) > 1:
+                rich, plain = (
+                    self._once((axis, each), lambda: self._clock.part(axis, each, rows))  # noqa: B023
+                    for each in options
+                )
+                ns += plain - rich
+        return ns
+
+    def _kind(self, name: str, choice: Choice) -> tuple[materials.Kind, tuple[materials.Rows, ...]]:
+        kinds, world = build.world(replace_materials(self.scene, self.named[name]), {name: choice})
+        return kinds[0], world.rows
+
+    def _once(self, key: Hashable, measure: Callable[[], float]) -> float:
+        if key not in self._costs:
+            self._costs[key] = measure()
+        return self._costs[key]
+
+    def whole(self, choices: Choices, seed: int = 0) -> Batches:
+        """With the formulas compiled for these choices alone: what they cost. What rounds to a stored precision is left out."""
+        choices = {name: replace(choice, precision="float32") for name, choice in choices.items()}
+        return self._batches(choices, self.samples, by_row=False, seed=seed)
 
 
 def replace_materials(scene: Scene, material: Material) -> Scene:
@@ -133,34 +190,27 @@ def with_option(material: Material, choice: Choice, axis: str, option: str) -> C
     return choice
 
 
+def stages(scene: Scene) -> int:
+    """How often `choose` says what it does, at most but for what it takes back."""
+    search = _Search(scene, 0.0, lambda text: None)
+    options = {(axis, each) for material in scene.materials for axis in AXES for each in search.options(material, axis)}
+    return 3 + len(options) + sum(material.surface != "diffuse" for material in scene.materials)
+
+
 def choose(scene: Scene, tolerance: float, say: Callable[[str], None] = lambda text: None) -> Result:
-    """Search; `say` is told what is being done."""
+    """Search; `say` is told what is done next."""
     if not (np.isfinite(tolerance) and tolerance >= 0):
         raise InputError(f"--tolerance = {tolerance:g}; need 0 or a positive number, the deviation over mean radiance")
     search = _Search(scene, tolerance, say)
     visible = [name for name in search.named if name in search.regions]
     if not visible:
         raise InputError(f"{scene.path}: view sees none of the shapes; there is nothing to choose for")
-    plainest = _plainest(search)
-    say("the plainest of everything")
-    deviations = search.measure(plainest)
-    steps: tuple[Step, ...] = ()
-    chosen: dict[str, Choice] = plainest
-    if not all(search.within(each) for each in deviations.values()):
-        steps = _steps(search)
-        chosen, deviations = _together(search, _affordable(search, steps), steps)
+    say("the richest")
+    costs = {name: search.cost(name, search.richest[name]) for name in visible}
+    steps = _steps(search)
+    chosen, deviations = _together(search, _affordable(search, steps), steps)
     samplers = _samplers(search, chosen)
-    chosen = _cheapest_samplers(chosen, samplers)
-    return _result(search, chosen, steps, samplers, deviations)
-
-
-def _plainest(search: _Search) -> dict[str, Choice]:
-    choices = dict(search.richest)
-    for name, material in search.named.items():
-        for axis in AXES:
-            for option in search.options(material, axis)[:1]:
-                choices[name] = with_option(material, choices[name], axis, option)
-    return choices
+    return _result(search, _cheapest_samplers(search, chosen, samplers), steps, samplers, costs, deviations)
 
 
 def _steps(search: _Search) -> tuple[Step, ...]:
@@ -184,11 +234,11 @@ def _steps(search: _Search) -> tuple[Step, ...]:
 
 
 def _affordable(search: _Search, steps: tuple[Step, ...]) -> dict[str, Choice]:
-    """Per material and axis the plainest option that alone is within the tolerance."""
+    """Per material and axis the plainest option that alone is within the tolerance, and no dearer."""
     choices = dict(search.richest)
     for axis in AXES:
         for step in reversed(steps):  # the plainest is taken last
-            if step.axis == axis and search.within(step.deviation):
+            if step.axis == axis and search.takes(step):
                 material = search.named[step.material]
                 choices[step.material] = with_option(material, choices[step.material], axis, step.option)
     return choices
@@ -231,8 +281,8 @@ def _samplers(search: _Search, chosen: dict[str, Choice]) -> tuple[Sampler, ...]
                 continue  # the visible normals of another microsurface
             ns, noise = search.cost(name, replace(choice, sampler=sampler)), 1.0
             other_density = sampler in BOUNDED or sampler == "normals"
-            if sampler == "normals" and ns >= search.cost(name, choice):
-                continue
+            if sampler == "normals" and DEARER * ns >= search.cost(name, choice):
+                continue  # its variance is larger
             if other_density:
                 base = base or search.whole(chosen)
                 pictures[sampler] = pictures.get(sampler) or search.whole(_all_with(search, chosen, sampler))
@@ -251,19 +301,25 @@ def _all_with(search: _Search, chosen: dict[str, Choice], sampler: str) -> dict[
     }
 
 
-def _cheapest_samplers(chosen: dict[str, Choice], samplers: tuple[Sampler, ...]) -> dict[str, Choice]:
+def _cheapest_samplers(search: _Search, chosen: dict[str, Choice], samplers: tuple[Sampler, ...]) -> dict[str, Choice]:
+    """Materials of one kind share a sampler, by their pixels' effort: a second sampler would be a second branch for all."""
     best = dict(chosen)
-    for name in chosen:
-        mine = [each for each in samplers if each.material == name]
-        if mine:
-            best[name] = replace(chosen[name], sampler=min(mine, key=lambda each: each.ns * each.noise).sampler)
+    sampled = {each.material: {other.sampler: other.effort for other in samplers if other.material == each.material}
+               for each in samplers}  # fmt: skip
+    family = {name: build.formless(build.kind_of(search.named[name], chosen[name])) for name in sampled}
+    for name in sampled:
+        alike = [other for other in sampled if family[other] == family[name]]
+        shared = [each for each in sampled[name] if all(each in sampled[other] for other in alike)]
+        effort = {each: sum(sampled[other][each] * search.regions[other].sum() for other in alike) for each in shared}
+        best[name] = replace(chosen[name], sampler=min(effort, key=effort.__getitem__))
     return best
 
 
-def _result(search: _Search, chosen, steps, samplers, deviations) -> Result:
-    search.say("the richest and the chosen, timed")
-    pictures = {"richest": search.whole(search.richest), "chosen": search.whole(chosen)}
-    effort = {name: each.ns_per_sample * float(each.variance.mean()) for name, each in pictures.items()}
-    faster = effort["richest"] / effort["chosen"]
-    settled = search.scene, search.tolerance, search.richest, chosen, steps, samplers, deviations, pictures
-    return Result(*settled, faster)
+def _result(search: _Search, chosen, steps, samplers, costs, deviations) -> Result:
+    search.say("the richest and the chosen, timed in turns")
+    turns = [(search.whole(search.richest, seed), search.whole(chosen, seed)) for seed in range(TURNS_OF_ALL)]
+    speed = float(np.median([richest.ns_per_sample / ours.ns_per_sample for richest, ours in turns]))
+    noise = sum(richest.variance.mean() for richest, _ in turns) / sum(ours.variance.mean() for _, ours in turns)
+    pictures = {"richest": turns[0][0], "chosen": turns[0][1]}
+    found = search.scene, search.tolerance, search.richest, chosen, steps, samplers, costs, deviations, pictures
+    return Result(*found, speed * float(noise))

@@ -2,8 +2,8 @@
 
 import math
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import jax
 import jax.numpy as jnp
@@ -15,6 +15,9 @@ from ggxref.scene.materials import Kind, Rows
 SURE = 2.0
 """Standard errors that a deviation keeps from the tolerance."""
 _LANES = 1 << 14
+_TURNS = 41
+USES = {"g2": 2, "fresnel": 2, "trigonometry": 1}
+"""How often a bounce needs a part: G2 and F of the direction drawn and of the light's, one azimuth."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,8 @@ def deviation(differences: np.ndarray, level: float) -> Deviation:
     count = len(differences)
     if count < 2:
         raise ValueError(f"{count} batch of differences; the error needs two")
+    if not np.isfinite(differences).all():  # half precision overflows
+        return Deviation(math.inf, 0.0)
 
     def square(d):
         n = len(d)
@@ -75,14 +80,11 @@ class Batches:
 
 
 def batches(kinds, world, settings: render.Settings, *, count: int, samples: int, seed: int) -> Batches:
-    """`count` pictures of `samples` samples a pixel, seeds in turn: the same seeds give two models the same numbers."""
-    render.render(kinds, world, settings, samples=2, seed=seed)  # compiles
-    found = [render.render(kinds, world, settings, samples=samples, seed=seed + k) for k in range(count)]
-    pixels = settings.width * settings.height
-    # The least: what else the machine does only adds to it.
-    fastest = min(each.seconds for each in found) / (samples * pixels) * 1e9
-    variance = np.mean([each.variance for each in found], axis=0)
-    return Batches(np.stack([each.mean for each in found]), variance, fastest)
+    """`count` pictures of `samples` samples a pixel: one seed gives two models the same numbers."""
+    settings = replace(settings, batches=count)
+    render.render(kinds, world, settings, samples=1, seed=seed)  # compiles
+    found = render.render(kinds, world, settings, samples=samples, seed=seed)
+    return Batches(found.mean, found.variance.mean(axis=0), found.seconds / (samples * settings.slots) * 1e9)
 
 
 def deviations(one: Batches, other: Batches, regions: Mapping[str, np.ndarray]) -> dict[str, Deviation]:
@@ -95,25 +97,46 @@ def deviations(one: Batches, other: Batches, regions: Mapping[str, np.ndarray]) 
     }
 
 
-def shading_cost(kind: Kind, rows: Rows, repeats: int = 15) -> float:
-    """Processor nanoseconds that a bounce spends in a kind's formulas: one direction drawn, one evaluated. The least of repeats.
+class Clock:
+    """Processor time of kinds' formulas, each measured in turn with the first, so that what else the machine does hits both."""
 
-    - `rows`: of one material. Known directions are spread over the hemisphere.
-    """
-    row = Rows(*(field[0] for field in rows))
+    def __init__(self):
+        keys = jax.random.split(jax.random.key(0))
+        self._numbers = [jax.random.uniform(key, (4, _LANES), jnp.float32) for key in keys]
+        self._first: Callable | None = None
+        self._ns = 0.0
 
-    def bounce(u, v):
-        wi = materials.cosine_lobe(v[:2])
-        drawn = materials.sample(kind, row, u, wi)
-        value, pdf = materials.evaluate(kind, row, wi, materials.cosine_lobe(v[2:]))
-        return drawn.value, drawn.pdf, drawn.wo, value, pdf
+    def bounce(self, kind: Kind, rows: Rows) -> float:
+        """Nanoseconds a bounce: one direction drawn, one evaluated. `rows`: of one material.
 
-    keys = jax.random.split(jax.random.key(0))
-    u, v = (jax.random.uniform(key, (4, _LANES), jnp.float32) for key in keys)
-    compiled = jax.jit(jax.vmap(bounce, -1, -1)).lower(u, v).compile()
-    times = []
-    for _ in range(repeats):
+        Known directions are spread over the hemisphere.
+        """
+
+        def formulas(u, v):
+            wi, light = (tuple(jax.vmap(materials.cosine_lobe, -1, -1)(pair)) for pair in (v[:2], v[2:]))
+            return render.bounce(kind, render.row_of(rows, jnp.int32(0)), tuple(u), wi, light)
+
+        return self._measure(formulas)
+
+    def part(self, axis: str, option: str, rows: Rows) -> float:
+        """Nanoseconds that a bounce spends in one form of G2, Fresnel or trigonometry."""
+        row = Rows(*(field[0] for field in rows))
+        forms: dict[str, Callable] = {
+            "g2": lambda u: materials.G2_OF_G1[option](u[0], u[1]),
+            "fresnel": lambda u: materials.FRESNEL_FORMS[option](row, u[0]),
+            "trigonometry": lambda u: materials.TURNS[option](u[0]),
+        }
+        return USES[axis] * self._measure(lambda u, v: jax.vmap(forms[axis], -1)(u))
+
+    def _measure(self, formulas: Callable) -> float:
+        compiled = jax.jit(formulas).lower(*self._numbers).compile()
+        if self._first is None:
+            self._first, self._ns = compiled, min(self._time(compiled) for _ in range(_TURNS)) / _LANES * 1e9
+            return self._ns
+        ratios = [self._time(compiled) / self._time(self._first) for _ in range(_TURNS)]
+        return float(np.median(ratios)) * self._ns
+
+    def _time(self, compiled: Callable) -> float:
         begun = time.process_time()
-        jax.block_until_ready(compiled(u, v))
-        times.append(time.process_time() - begun)
-    return min(times) / _LANES * 1e9
+        jax.block_until_ready(compiled(*self._numbers))
+        return time.process_time() - begun

@@ -3,8 +3,8 @@ r"""Materials: a microfacet model of the library, its sampler, and the rows of p
 A `Kind` is what the compiler sees, a row of `Rows` what the material is; materials of one kind cost one evaluation.
 Radiance is carried as L/n², which a refraction conserves, so that refraction needs no factor η² (heitz2014 §2.2).
 
-In the local frame the known direction `wi` is above the horizon: seen from inside, the frame is turned about its x axis, and
-the underside of the microsurface has the shape matrix A diag(−1, 1, 1).
+In the local frame the known direction `wi` is above the horizon. Seen from inside, all three axes of the frame are reversed:
+the underside of a microsurface has the normals −ωm, so that it keeps its shape matrix.
 """
 
 import math
@@ -13,16 +13,28 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import jax.numpy as jnp
-from jax import Array
+from jax import Array, lax
 
 from ggxref import bsdf, fresnel, geometry, jacobian, masking, ndf, sampling, stable
-from ggxref._types import Scalar, Vec2, Vec3
+from ggxref._types import Scalar, Turn, Vec2, Vec3
 
 Formula = Callable[..., Array]
 
 NDFS = ("ggx", "beckmann", "ellipsoid")
 G2S = ("separable", "height_correlated", "v_cavity")
+G2_OF_G1 = {"separable": masking.g2_separable, "height_correlated": masking.g2_height_correlated}
 FRESNELS = ("one", "schlick", "exact")
+TURNS = {
+    "2 terms": lambda u: stable.cos_sin_turn(u, 2),
+    "3 terms": lambda u: stable.cos_sin_turn(u, 3),
+    "exact": stable.cos_sin_turn,
+}
+"""Forms of cos 2πu and sin 2πu in a sampler: Taylor polynomials on an eighth of a turn, the last to the dtype's precision."""
+PRECISIONS = {"bfloat16": (8, 7), "float16": (5, 10), "float32": (8, 23)}
+"""Bits of exponent and mantissa with which a material's parameters, directions, values and densities are stored.
+
+What is done with them is done in float32: half precision that is fast is another machine's, what it loses is not.
+"""
 
 NORMALS = {
     "ggx": (sampling.normals.sample_ggx, sampling.normals.pdf_ggx),
@@ -35,14 +47,15 @@ VISIBLE = {
 }
 BOUNDED = ("bounded_cap", "ellipsoid_bounded")
 """Samplers of reflections alone: they leave out micronormals that refraction needs."""
+TURNING = ("normals", "cross_section", "spherical_cap", "bounded_cap", "ellipsoid_cap", "ellipsoid_bounded")
+"""Samplers that turn u into an azimuth, by any of `TURNS`."""
 
 
 @dataclass(frozen=True)
 class Kind:
-    """What is compiled. More than one G2 or Fresnel form: the row's `g2` and `fresnel` number picks among them.
+    """What is compiled. More than one form of G2, Fresnel, trigonometry or precision: the row's number picks among them.
 
     - `surface`: "conductor" (any opaque microsurface), "dielectric" or "diffuse".
-    - `dtype`: the formulas' own precision; the renderer's stays what it is.
     """
 
     surface: str = "conductor"
@@ -51,7 +64,8 @@ class Kind:
     fresnel: tuple[str, ...] = ("exact",)
     sampler: str = "spherical_cap"
     diffuse: bool = False
-    dtype: str = "float32"
+    trigonometry: tuple[str, ...] = ("exact",)
+    precision: tuple[str, ...] = ("float32",)
 
 
 class Rows(NamedTuple):
@@ -70,6 +84,17 @@ class Rows(NamedTuple):
     albedo: Array
     g2: Array
     fresnel: Array
+    trigonometry: Array
+    precision: Array
+
+
+FRESNEL_FORMS: dict[str, Formula] = {
+    "one": lambda row, cosine: row.f0 * jnp.ones_like(cosine),
+    "schlick": lambda row, cosine: fresnel.schlick(cosine, row.f0),
+    "exact": lambda row, cosine: fresnel.conductor(cosine, row.eta, row.k),
+}
+FORMS = ("g2", "fresnel", "trigonometry", "precision")
+"""The fields of `Rows` that number the forms of a kind."""
 
 
 class Scatter(NamedTuple):
@@ -93,10 +118,20 @@ def _shape(kind: Kind, row: Rows) -> Array:
 
 def _draw(kind: Kind, row: Rows, u: Vec3, wi: Vec3) -> Vec3:
     if kind.sampler == "normals":
-        return NORMALS[kind.ndf][0](u[:2], row.alpha)
+        return NORMALS[kind.ndf][0](u[:2], row.alpha, turn=_turn(kind, row))
     if kind.sampler == "v_cavity":
         return sampling.v_cavity.sample(u, wi, row.alpha, distribution=kind.ndf)  # pyright: ignore[reportArgumentType]
-    return getattr(sampling, kind.sampler).sample(u[:2], wi, _shape(kind, row))
+    form = {"turn": _turn(kind, row)} if kind.sampler in TURNING else {}
+    return getattr(sampling, kind.sampler).sample(u[:2], wi, _shape(kind, row), **form)
+
+
+def _turn(kind: Kind, row: Rows) -> Turn:
+    def turn(u):
+        forms = [TURNS[name](u) for name in kind.trigonometry]
+        cos, sin = (dict(zip(kind.trigonometry, form, strict=True)) for form in zip(*forms, strict=True))
+        return _pick(kind.trigonometry, row.trigonometry, cos), _pick(kind.trigonometry, row.trigonometry, sin)
+
+    return turn
 
 
 def _density(kind: Kind, row: Rows, wm: Vec3, wi: Vec3) -> Scalar:
@@ -107,45 +142,28 @@ def _density(kind: Kind, row: Rows, wm: Vec3, wi: Vec3) -> Scalar:
     return getattr(sampling, kind.sampler).pdf(wm, wi, _shape(kind, row))
 
 
-def _pick(names: tuple[str, ...], number: Array, values: dict[str, Formula]) -> Scalar:
+def _pick(names: tuple[str, ...], number: Array, values: dict[str, Array]) -> Array:
     """The one form that the kind has, or the one of several that the row names."""
-    value = values[names[0]]()
+    value = values[names[0]]
     for k, name in enumerate(names[1:], start=1):
-        value = jnp.where(number == k, values[name](), value)
+        value = jnp.where(number == k, values[name], value)
     return value
 
 
 def _g2(kind: Kind, row: Rows, wi: Vec3, wo: Vec3, wm: Vec3) -> Scalar:
+    if kind.g2 == ("v_cavity",):
+        return masking.g2_v_cavity(wi, wo, wm)
     g1: Formula = getattr(masking, f"g1_{kind.ndf}")
-    shape = _shape(kind, row)
+    g1_i, g1_o = g1(wi, wm, _shape(kind, row)), g1(wo, wm, _shape(kind, row))
+    forms = {name: form(g1_i, g1_o) for name, form in G2_OF_G1.items()}
     # The height-correlated form is of reflection; transmission takes the product (heitz2014 §2.1).
-    forms: dict[str, Formula] = {
-        "separable": lambda: masking.g2_separable(g1(wi, wm, shape), g1(wo, wm, shape)),
-        "height_correlated": lambda: jnp.where(
-            wo[2] > 0,
-            masking.g2_height_correlated(g1(wi, wm, shape), g1(wo, wm, shape)),
-            masking.g2_separable(g1(wi, wm, shape), g1(wo, wm, shape)),
-        ),
-        "v_cavity": lambda: masking.g2_v_cavity(wi, wo, wm),
-    }
-    return _pick(kind.g2, row.g2, forms)
+    return jnp.where(wo[2] > 0, _pick(kind.g2, row.g2, forms), forms["separable"])
 
 
 def _fresnel(kind: Kind, row: Rows, cosine: Scalar) -> Scalar:
     if kind.surface == "dielectric":
         return fresnel.dielectric(cosine, 1 / row.eta)
-    forms: dict[str, Formula] = {
-        "one": lambda: row.f0 * jnp.ones_like(cosine),
-        "schlick": lambda: fresnel.schlick(cosine, row.f0),
-        "exact": lambda: fresnel.conductor(cosine, row.eta, row.k),
-    }
-    return _pick(kind.fresnel, row.fresnel, forms)
-
-
-def seen_from_below(row: Rows) -> Rows:
-    """The row for rays inside: the underside of its microsurface, the index inverted."""
-    A = jnp.stack([jnp.stack([-a[0], a[1], a[2]]) for a in row.A])
-    return row._replace(A=A, eta=1 / row.eta)
+    return _pick(kind.fresnel, row.fresnel, {name: FRESNEL_FORMS[name](row, cosine) for name in kind.fresnel})
 
 
 def _diffuse_share(row: Rows) -> Scalar:
@@ -181,21 +199,29 @@ def evaluate(kind: Kind, row: Rows, wi: Vec3, wo: Vec3) -> tuple[Scalar, Scalar]
     if kind.surface == "diffuse":
         cosine = jnp.maximum(wo[2], 0) / math.pi
         return row.albedo * cosine, cosine
-    dtype = wi.dtype
-    row, wi, wo = _cast(kind, row, wi, wo)
+    row, (wi, wo) = _given(kind, row), (_direction(kind, row, w) for w in (wi, wo))
     wm = geometry.half_reflection(wi, wo)
     if kind.surface == "dielectric":
         across = geometry.half_refraction(wi, wo, jnp.ones_like(row.eta), row.eta)
         wm = jnp.where(wo[2] > 0, wm, across)
     value, pdf = _with_diffuse(kind, row, wo, *_at(kind, row, wi, wo, wm))
-    return value.astype(dtype), pdf.astype(dtype)
+    return _rounded(kind, row, value), _rounded(kind, row, pdf)
 
 
-def _cast(kind, row, *directions):
-    """Parameters and directions in the formulas' dtype."""
-    whole = ("g2", "fresnel")
-    row = row._replace(**{k: v.astype(kind.dtype) for k, v in row._asdict().items() if k not in whole})
-    return row, *(w.astype(kind.dtype) for w in directions)
+def _rounded(kind: Kind, row: Rows, x: Array) -> Array:
+    """`x` as the kind's precision, or the one of several that the row names, stores it."""
+    return _pick(
+        kind.precision, row.precision, {name: lax.reduce_precision(x, *PRECISIONS[name]) for name in kind.precision}
+    )
+
+
+def _given(kind: Kind, row: Rows) -> Rows:
+    return row._replace(**{k: _rounded(kind, row, v) for k, v in row._asdict().items() if k not in FORMS})
+
+
+def _direction(kind: Kind, row: Rows, w: Vec3) -> Vec3:
+    """A direction that was stored, and made unit again."""
+    return w if kind.precision == ("float32",) else stable.direction(*_rounded(kind, row, w))
 
 
 def cosine_lobe(u: Vec2) -> Vec3:
@@ -210,11 +236,7 @@ def sample(kind: Kind, row: Rows, u: Array, wi: Vec3) -> Scatter:
     if kind.surface == "diffuse":
         wo = cosine_lobe(u[:2])
         return Scatter(wo, *evaluate(kind, row, wi, wo))
-    dtype = wi.dtype
-    row, wi = _cast(kind, row, wi)
-    # Half precision has no 24 bits to hold u, and 1 is not in the range.
-    below_one = 1 - float(jnp.finfo(kind.dtype).epsneg)
-    u = jnp.minimum(u.astype(kind.dtype), below_one)
+    row, wi = _given(kind, row), _direction(kind, row, wi)
     wm = _draw(kind, row, u[:3], wi)
     wo = geometry.reflect(wi, wm)
     if kind.surface == "dielectric":
@@ -224,4 +246,4 @@ def sample(kind: Kind, row: Rows, u: Array, wi: Vec3) -> Scatter:
         wo = jnp.where(u[3] < _diffuse_share(row), cosine_lobe(u[:2]), wo)
         wm = geometry.half_reflection(wi, wo)
     value, pdf = _with_diffuse(kind, row, wo, *_at(kind, row, wi, wo, wm))
-    return Scatter(wo.astype(dtype), value.astype(dtype), pdf.astype(dtype))
+    return Scatter(_direction(kind, row, wo), _rounded(kind, row, value), _rounded(kind, row, pdf))

@@ -14,6 +14,8 @@ from ggxref.errors import InputError
 
 _REQUIRED = object()
 _NUMBER = (int, float)
+MOST = 1 << 29
+"""Samples of a picture, numbered with 32 bits; `choose` takes four times as many where it must."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,10 @@ class Material:
 
 @dataclass(frozen=True)
 class Scene:
-    """`view`: origin, to, fov [rad]; `shapes`, `lights`: their kind and fields as in the file, angles in radians."""
+    """`view`: origin, to, fov [rad]; `shapes`, `lights`: their kind and fields as in the file.
+
+    `samples` a pixel; or, where not 0, `seconds` of processor time a picture.
+    """
 
     path: Path
     title: str
@@ -306,9 +311,15 @@ def read(path: Path) -> Scene:
     root = Table(path, "", values)
     title = root.take("title", text(), path.stem)
     budget = root.table("budget")
-    samples, seconds = budget.take("samples", whole(2, 1 << 20), 256), budget.take("seconds", number(0, 1e5), 0.0)
+    if budget.has("samples") and budget.has("seconds"):
+        raise budget.bad("seconds", "with samples beside it; need one of the two")
+    seconds = budget.take("seconds", number(0, 1e5, above=True), 0.0)
+    samples = budget.take("samples", whole(2, 1 << 20), 256)
     budget.close()
     width, height, view = _view(root.table("view"))
+    if samples * width * height > MOST:
+        what = f"{samples} samples of {width} x {height} pixels"
+        raise InputError(f"{path}: budget.samples: {what}; at most {MOST} samples can be numbered")
     table = root.table("materials")
     materials = tuple(_material(name, table.table(name)) for name in table.values)
     if not materials:

@@ -21,7 +21,7 @@ from ggxref.scene import lights, materials, shapes
 from ggxref.scene.lights import Light
 from ggxref.scene.materials import Kind, Rows
 from ggxref.scene.shapes import Shape
-from ggxref.scene.vectors import Vector, ahead, combine, cross, dot, scale, select, unit
+from ggxref.scene.vectors import AnyVector, Vector, ahead, combine, cross, dot, scale, select, unit
 
 Row = Any  # a `Rows` of lanes: its vectors and matrices are tuples of arrays (n,)
 
@@ -67,17 +67,27 @@ class Lane(NamedTuple):
 
 @dataclass(frozen=True)
 class Settings:
-    """What is compiled besides the kinds. `strategy`: "mis", "bsdf" or "light"."""
+    """What is compiled besides the kinds. `strategy`: "mis", "bsdf" or "light". `batches`: independent pictures made at once."""
 
     width: int
     height: int
     strategy: str = "mis"
     lanes: int = LANES
+    batches: int = 1
+
+    @property
+    def slots(self) -> int:
+        """Pixels of all batches."""
+        return self.width * self.height * self.batches
 
 
 @dataclass(frozen=True)
 class Picture:
     """`mean`, `variance` (of one sample) and `largest` sample per pixel, (height, width), float64; `samples` per pixel.
+
+    `bounces`: rays that a path sends on, the camera's included, on average.
+
+    Of several batches, (batches, height, width), and `samples` per pixel and batch.
 
     `seconds`: of processor time, all cores together: what else the machine does is not in it.
     """
@@ -86,6 +96,7 @@ class Picture:
     variance: np.ndarray
     largest: np.ndarray
     samples: int
+    bounces: float
     seconds: float
 
     @property
@@ -147,7 +158,10 @@ def _camera_ray(settings: Settings, camera: Camera, seed, sample) -> Lane:
 
 
 class Surface(NamedTuple):
-    """Where a path meets a material: the rows t, b, n of the local frame, n on the ray's side, and `wi` in it."""
+    """Where a path meets a material: the rows t, b, n of the local frame, n on the ray's side, and `wi` in it.
+
+    From `below` all three are reversed (`materials`).
+    """
 
     t: Vector
     b: Vector
@@ -156,12 +170,11 @@ class Surface(NamedTuple):
     below: Array
 
 
-def _frame(hit: shapes.Hit, row: Row, direction: Vector) -> Surface:
+def _frame(hit: shapes.Hit, turn: AnyVector, direction: Vector) -> Surface:
     n, tangent = hit.normal, hit.tangent
-    t = ahead(scale(row.turn[0], tangent), row.turn[1], cross(n, tangent))
+    t = ahead(scale(turn[0], tangent), turn[1], cross(n, tangent))
     below = dot(direction, n) > 0
-    n = scale(jnp.where(below, -1.0, 1.0), n)
-    b = cross(n, t)
+    t, b, n = (scale(jnp.where(below, -1.0, 1.0), axis) for axis in (t, cross(n, t), n))
     return Surface(t, b, n, (-dot(direction, t), -dot(direction, b), -dot(direction, n)), below)
 
 
@@ -176,20 +189,28 @@ class Shading(NamedTuple):
     pdf: Array
 
 
-def _shade(kind: Kind, row: Row, hit: shapes.Hit, direction: Vector, light: Vector, u: tuple[Array, ...]) -> Shading:
-    surface = _frame(hit, row, direction)
+def _shade(
+    kind: Kind, rows: Rows, number: Array, hit: shapes.Hit, direction: Vector, light: Vector, u: tuple[Array, ...]
+) -> Shading:
+    row = row_of(rows, number)
+    surface = _frame(hit, row.turn, direction)
+    if kind.surface == "dielectric":
+        row = row._replace(eta=jnp.where(surface.below, 1 / row.eta, row.eta))
     local = (dot(light, surface.t), dot(light, surface.b), dot(light, surface.n))
-    wo, value, pdf, light_value, light_pdf = jax.vmap(partial(_scatter, kind))(row, surface.below, u, surface.wi, local)
+    wo, value, pdf, light_value, light_pdf = bounce(kind, row, u, surface.wi, local)
     return Shading(light_value, light_pdf, surface.n, combine(wo, surface.t, surface.b, surface.n), value, pdf)
 
 
-def _scatter(kind: Kind, row: Row, below: Array, u: tuple[Array, ...], wi: Vector, light: Vector):
-    """The formulas, for one lane: a direction drawn, and the one to the light."""
-    row = Rows(*(_whole(field) for field in row))
-    flipped = materials.seen_from_below(row)
-    row = Rows(*(jnp.where(below, under, over) for under, over in zip(flipped, row, strict=True)))
-    drawn = materials.sample(kind, row, jnp.stack(u), jnp.stack(wi))
-    return tuple(drawn.wo), drawn.value, drawn.pdf, *materials.evaluate(kind, row, jnp.stack(wi), jnp.stack(light))
+def bounce(kind: Kind, row: Row, u: tuple[Array, ...], wi: Vector, light: Vector):
+    """The formulas of a bounce, in the local frame: a direction drawn, its value and pdf, those of `light`."""
+    lanes: Any = Rows._make(0 if _laned(field) else None for field in row)
+    return jax.vmap(partial(_bounce, kind), (lanes, 0, 0, 0))(row, u, wi, light)
+
+
+def _bounce(kind: Kind, row: Row, u: tuple[Array, ...], wi: Vector, light: Vector):
+    whole = Rows(*(_whole(field) for field in row))
+    drawn = materials.sample(kind, whole, jnp.stack(u), jnp.stack(wi))
+    return tuple(drawn.wo), drawn.value, drawn.pdf, *materials.evaluate(kind, whole, jnp.stack(wi), jnp.stack(light))
 
 
 def _whole(parts) -> Array:
@@ -200,11 +221,18 @@ def _parts(whole) -> Any:
     return tuple(_parts(part) for part in whole) if jnp.ndim(whole) else whole
 
 
-def _row(rows: Rows, number: Array) -> Row:
-    """The rows of many numbers; a number out of range gives the first or the last."""
-    row = jax.tree.map(lambda x: jnp.full(number.shape, x), Rows(*(_parts(field[0]) for field in rows)))
-    for k in range(1, rows.eta.shape[0]):
-        row = select(number >= k, Rows(*(_parts(field[k]) for field in rows)), row)
+def _laned(field) -> bool:
+    return jnp.ndim(jax.tree.leaves(field)[0]) > 0
+
+
+def row_of(rows: Rows, number: Array) -> Row:
+    """The rows of many numbers; a number out of range gives the first or the last. Of one row, no lane has its own."""
+    first, *others = (Rows(*(_parts(field[k]) for field in rows)) for k in range(rows.eta.shape[0]))
+    if not others:
+        return first
+    row = jax.tree.map(lambda x: jnp.full(number.shape, x), first)
+    for k, other in enumerate(others, start=1):
+        row = select(number >= k, other, row)
     return row
 
 
@@ -218,7 +246,7 @@ def _answer(kinds: tuple[Kind, ...], world: World, hit: shapes.Hit, direction: V
         shade = partial(_shade, kind)
         # A branch keeps the formulas apart from the rest, of which XLA's fusion would compute parts many times over
         # (3.1 µs against 0.3), and a kind that no lane has met costs nothing.
-        operands = _row(rows, number), hit, direction, light, u
+        operands = rows, number, hit, direction, light, u
         found = lax.cond(mine.any(), shade, lambda *_, nothing=answer: nothing, *operands)
         answer = select(mine, found, answer)
         first += rows.eta.shape[0]
@@ -283,19 +311,20 @@ class _Run(NamedTuple):
     total: Array
     square: Array
     largest: Array
+    bounces: Array
 
 
 @partial(jax.jit, static_argnums=(0, 1))
 def _block(kinds, settings: Settings, world: World, seed, first, samples):
-    """Sums over `samples` samples from number `first` on: radiance, its square, its largest, per pixel, (pixels,)."""
-    pixels = settings.width * settings.height
+    """Sums over `samples` samples from number `first` on: radiance, its square, its largest, per slot, (slots,); rays."""
+    slots = settings.slots
     step, begin = partial(_step, kinds, settings, world, seed), partial(_camera_ray, settings, world.camera, seed)
     ordinal = jnp.arange(settings.lanes, dtype=jnp.uint32)
 
     def body(run: _Run) -> _Run:
         lanes = step(run.lanes)
         done = run.lanes.alive & ~lanes.alive
-        pixel = (lanes.sample % jnp.uint32(pixels)).astype(jnp.int32)
+        slot = (lanes.sample % jnp.uint32(slots)).astype(jnp.int32)
         value = jnp.where(done, lanes.radiance, 0)
         free = ~lanes.alive
         number = run.next + jnp.cumsum(free.astype(jnp.uint32)) - 1
@@ -306,17 +335,20 @@ def _block(kinds, settings: Settings, world: World, seed, first, samples):
         return _Run(
             lanes,
             run.next + starts.sum(dtype=jnp.uint32),
-            run.total.at[pixel].add(value),
-            run.square.at[pixel].add(value * value),
-            run.largest.at[pixel].max(value),
+            run.total.at[slot].add(value),
+            run.square.at[slot].add(value * value),
+            run.largest.at[slot].max(value),
+            run.bounces + run.lanes.alive.sum(dtype=jnp.uint32),
         )
 
     lanes = begin(first + ordinal)
     lanes = lanes._replace(alive=ordinal < samples)
-    empty = jnp.zeros(pixels, lanes.radiance.dtype)
+    empty = jnp.zeros(slots, lanes.radiance.dtype)
     begun = jnp.minimum(jnp.uint32(settings.lanes), samples)
-    run = lax.while_loop(lambda run: run.lanes.alive.any(), body, _Run(lanes, begun, empty, empty, empty))
-    return run.total, run.square, run.largest
+    run = lax.while_loop(
+        lambda run: run.lanes.alive.any(), body, _Run(lanes, begun, empty, empty, empty, jnp.uint32(0))
+    )
+    return run.total, run.square, run.largest, run.bounces
 
 
 def render(
@@ -333,17 +365,19 @@ def render(
 
     Deterministic: the same arguments give the same bytes (but for `seconds`, which is a clock's).
     """
-    pixels = settings.width * settings.height
-    total, square, largest = (np.zeros(pixels) for _ in range(3))
-    begun, done = time.process_time(), 0
+    slots = settings.slots
+    total, square, largest = (np.zeros(slots) for _ in range(3))
+    begun, done, bounces = time.process_time(), 0, 0.0
     while done < samples and (not done or time.process_time() - begun < seconds):
         now = min(block, samples - done)
-        arguments = np.uint32(seed), np.uint32(done * pixels), np.uint32(now * pixels)
-        parts = [np.asarray(part, np.float64) for part in _block(kinds, settings, world, *arguments)]
+        arguments = np.uint32(seed), np.uint32(done * slots), np.uint32(now * slots)
+        *parts, rays = [np.asarray(part, np.float64) for part in _block(kinds, settings, world, *arguments)]
         total, square, largest, done = total + parts[0], square + parts[1], np.maximum(largest, parts[2]), done + now
+        bounces += float(rays)
     mean = total / done
     # Of one sample; unbiased.
     variance = np.maximum(square / done - mean**2, 0) * done / max(done - 1, 1)
-    shape = settings.height, settings.width
+    shape = (settings.batches,) * (settings.batches > 1) + (settings.height, settings.width)
     taken = time.process_time() - begun
-    return Picture(mean.reshape(shape), variance.reshape(shape), largest.reshape(shape), done, taken)
+    mean, variance, largest = (part.reshape(shape) for part in (mean, variance, largest))
+    return Picture(mean, variance, largest, done, bounces / (done * slots), taken)

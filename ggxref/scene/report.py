@@ -1,54 +1,97 @@
 """What `choose` found: tables for people, JSON for programs, figures."""
 
 import math
+from dataclasses import dataclass
 from importlib.metadata import version
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from ggxref.scene import image
 from ggxref.scene.build import Choice
-from ggxref.scene.choose import AXES, Result, Step
+from ggxref.scene.choose import AXES, DEARER, Result, Sampler, Step
 from ggxref.scene.compare import Deviation
 
 
+@dataclass(frozen=True)
+class Up:
+    """One step up an axis from what was chosen: the deviations and nanoseconds before and after, each alone."""
+
+    material: str
+    axis: str
+    option: str
+    richer: str
+    deviation: Deviation
+    left: Deviation
+    ns: float
+    richer_ns: float
+
+
+def steps_up(result: Result) -> list[Up]:
+    """What each step up from the chosen would buy, and cost."""
+    found = []
+    for at in result.steps:
+        if getattr(result.chosen[at.material], at.axis) != at.option:
+            continue
+        every = AXES[at.axis]
+        richer = every[every.index(at.option) + 1]
+        own = [s for s in result.steps if (s.material, s.axis, s.option) == (at.material, at.axis, richer)]
+        left, ns = (own[0].deviation, own[0].ns) if own else (Deviation(0.0, 0.0), result.costs[at.material])
+        found.append(Up(at.material, at.axis, at.option, richer, at.deviation, left, at.ns, ns))
+    return found
+
+
+def wasted(result: Result) -> dict[str, float]:
+    """Per material, the share of the richest's time at equal noise that the chosen formulas do not need."""
+    needed = {each.material: each.effort for each in result.samplers if _is_chosen(result, each)}
+    return {name: 1 - effort / result.costs[name] for name, effort in needed.items()}
+
+
+def _is_chosen(result: Result, each: Sampler) -> bool:
+    return result.chosen[each.material].sampler == each.sampler
+
+
 def _percent(deviation: Deviation) -> str:
+    if not math.isfinite(deviation.value):
+        return "not finite"
     return f"{100 * deviation.value:.2f} ± {100 * deviation.error:.2f}"
 
 
 def tables(result: Result) -> RenderableType:
     """The choice, what each option costs and loses, the samplers, and the whole."""
-    parts: list[RenderableType] = [Text(f"{result.scene.title}: within {100 * result.tolerance:g} % of the richest")]
-    parts += ["", _choice(result)]
-    if result.steps:
-        parts += ["", _steps(result)]
-    else:
-        parts += [
-            "",
-            Text("The plainest of everything is within the tolerance: no option needed a picture of its own."),
-        ]
-    parts += ["", _samplers(result), "", Text(_verdict(result))]
-    return Group(*parts)
+    title = f"{result.scene.title}: within {100 * result.tolerance:g} % of the richest"
+    parts = [Text(title), _choice(result), _steps(result), _ups(result), _samplers(result), Text(_verdict(result))]
+    return Group(*(each for part in parts for each in (part, "")))
 
 
 def _grid(title: str, *columns: str) -> Table:
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     for column in columns:
-        table.add_column(column, justify="right" if column[-1] in "%s" and column != "axis" else "left")
+        right = column.endswith(("%", "ns", "variances"))
+        table.add_column(column, justify="right" if right else "left", no_wrap=right)
     return table
 
 
 def _choice(result: Result) -> Table:
-    table = _grid("Chosen (more than is needed today)", "material", *AXES, "sampler", "deviation %")
+    shown = [axis for axis in (*AXES, "sampler") if any(_differs(result, name, axis) for name in result.chosen)]
+    table = _grid("Chosen (in brackets: the richest)", "material", *shown, "deviation %", "wasted today %")
+    saved = wasted(result)
     for name, deviation in result.deviations.items():
-        chosen, richest = result.chosen[name], result.richest[name]
-        cells = [_change(chosen, richest, key) for key in (*AXES, "sampler")]
-        diffuse = not any(each.material == name for each in result.samplers)
-        table.add_row(name, *(["-"] * len(cells) if diffuse else cells), _percent(deviation))
+        changes = [_change(result.chosen[name], result.richest[name], axis) if name in saved else "-" for axis in shown]
+        table.add_row(name, *changes, _percent(deviation), f"{100 * saved[name]:.0f}" if name in saved else "-")
+    kept = [axis for axis in AXES if axis not in shown]
+    if kept:
+        table.caption, table.caption_justify = f"The richest of every material is kept: {', '.join(kept)}.", "left"
     return table
+
+
+def _differs(result: Result, name: str, axis: str) -> bool:
+    return getattr(result.chosen[name], axis) != getattr(result.richest[name], axis)
 
 
 def _change(chosen: Choice, richest: Choice, key: str) -> str:
@@ -59,40 +102,56 @@ def _change(chosen: Choice, richest: Choice, key: str) -> str:
 def _verdict_on(result: Result, step: Step) -> str:
     if getattr(result.chosen[step.material], step.axis) == step.option:
         return "<- chosen"
-    return "within, alone" if step.deviation.most < result.tolerance else "beyond"
+    if step.deviation.most >= result.tolerance:
+        return "beyond"
+    return "within, but dearer" if step.ns > DEARER * result.costs[step.material] else "within, alone"
 
 
 def _steps(result: Result) -> Table:
-    columns = "material", "axis", "option", "deviation %", "formulas ns", ""
-    table = _grid("One option at a time, the rest the richest: what a step up from it buys", *columns[:-1])
+    columns = "material", "axis", "option", "deviation %", "formulas ns", "richest ns"
+    table = _grid("One option at a time, the rest the richest", *columns)
     table.add_column("")
     for step in sorted(result.steps, key=lambda step: step.material):
-        cells = step.material, step.axis, step.option, _percent(step.deviation), f"{step.ns:.0f}"
+        ns = f"{step.ns:.0f}", f"{result.costs[step.material]:.0f}"
+        cells = step.material, step.axis, step.option, _percent(step.deviation), *ns
         table.add_row(*cells, _verdict_on(result, step))
     return table
 
 
+def _ups(result: Result) -> Table:
+    columns = "material", "axis", "step up", "deviation %", "then %", "formulas ns"
+    table = _grid("What each step up from the chosen would buy", *columns)
+    for up in sorted(steps_up(result), key=lambda up: up.material):
+        cells = up.material, up.axis, f"{up.option} -> {up.richer}", _percent(up.deviation), _percent(up.left)
+        table.add_row(*cells, f"{up.richer_ns - up.ns:+.0f}")
+    return table
+
+
 def _samplers(result: Result) -> Table:
-    table = _grid("Samplers of the chosen models", "material", "sampler", "formulas ns", "variances", "product ns")
+    columns = "material", "sampler", "formulas ns", "variances", "product ns"
+    table = _grid("Samplers of the chosen models", *columns)
+    table.add_column("")
     for each in result.samplers:
-        chosen = result.chosen[each.material].sampler == each.sampler
-        product = f"{each.ns * each.noise:.0f}{' <-' if chosen else ''}"
-        table.add_row(each.material, each.sampler, f"{each.ns:.0f}", f"{each.noise:.3f}", product)
+        mark = "<- chosen" if _is_chosen(result, each) else ""
+        table.add_row(each.material, each.sampler, f"{each.ns:.0f}", f"{each.noise:.3f}", f"{each.effort:.0f}", mark)
     return table
 
 
 def _verdict(result: Result) -> str:
     ns = {name: each.ns_per_sample for name, each in result.pictures.items()}
+    share = 1 - 1 / result.faster
+    waste = f"{100 * share:.0f} % is wasted today" if share > 0 else "nothing is wasted today"
     return (
         f"Whole picture: {ns['richest']:.0f} ns a sample with the richest, {ns['chosen']:.0f} with the chosen; "
-        f"{result.faster:.2f} times faster at equal noise."
+        f"{result.faster:.2f} times as fast at equal noise: {waste}."
     )
 
 
 def document(result: Result) -> dict:
     """Everything in the tables, and what is needed to repeat them."""
+    saved = wasted(result)
     return {
-        "schema": "ggxref-choose-1",
+        "schema": "ggxref-choose-2",
         "versions": {name: version(name) for name in ("ggxref", "jax", "numpy")},
         "scene": str(result.scene.path),
         "tolerance": result.tolerance,
@@ -101,22 +160,20 @@ def document(result: Result) -> dict:
                 "richest": _record(result.richest[name]),
                 "chosen": _record(result.chosen[name]),
                 "deviation": _deviation(result.deviations.get(name)),
+                "richest_ns": result.costs.get(name),
+                "wasted": saved.get(name),
             }
             for name in result.chosen
         },
-        "steps": [
-            {
-                "material": s.material,
-                "axis": s.axis,
-                "option": s.option,
-                "ns": s.ns,
-                "deviation": _deviation(s.deviation),
-            }
-            for s in result.steps
+        "steps": [vars(each) | {"deviation": _deviation(each.deviation)} for each in result.steps],
+        "steps_up": [
+            vars(each) | {"deviation": _deviation(each.deviation), "left": _deviation(each.left)}
+            for each in steps_up(result)
         ],
         "samplers": [vars(each) for each in result.samplers],
         "ns_per_sample": {name: each.ns_per_sample for name, each in result.pictures.items()},
         "faster": result.faster,
+        "wasted": 1 - 1 / result.faster,
     }
 
 
@@ -125,35 +182,60 @@ def _record(choice: Choice) -> dict:
 
 
 def _deviation(deviation: Deviation | None) -> dict | None:
-    return None if deviation is None else {"value": deviation.value, "standard_error": deviation.error}
+    """Null where it is not finite, for which JSON has no number."""
+    if deviation is None or not math.isfinite(deviation.value):
+        return None
+    return {"value": deviation.value, "standard_error": deviation.error}
+
+
+_MARKS = dict(zip(AXES, "osD^v", strict=True))
 
 
 def figure(result: Result) -> bytes:
-    """Cost against deviation of every option, above the pictures side by side: PNG."""
-    plot = Figure(figsize=(9, 6), layout="constrained")
-    grid = plot.add_gridspec(2, 3, height_ratios=[1.2, 1])
-    axes = plot.add_subplot(grid[0, :])
-    marks = dict(zip(AXES, "osd", strict=True))
-    for step in result.steps:
-        deviation = 100 * max(step.deviation.value, 1e-5)
-        axes.errorbar(deviation, step.ns, xerr=100 * step.deviation.error, fmt=marks[step.axis], color="0.3", ms=4)
-        axes.annotate(f"{step.material}: {step.option}", (deviation, step.ns), fontsize=6, xytext=(3, 3),
-                      textcoords="offset points")  # fmt: skip
-    axes.axvline(100 * result.tolerance, color="tab:red", lw=1)
-    axes.set(
-        xscale="symlog", xlabel="deviation from the richest [%]; the line is the tolerance", ylabel="formulas [ns]"
-    )
-    richest, chosen = result.pictures["richest"].mean, result.pictures["chosen"].mean
-    mean = richest.mean()
-    pictures = {"richest": richest, "chosen": chosen, "(chosen - richest) / mean": (chosen - richest) / mean}
-    for k, (name, picture) in enumerate(pictures.items()):
-        panel = plot.add_subplot(grid[1, k])
-        if "-" in name:
-            reach = max(10 * result.tolerance, 0.01) if math.isfinite(result.tolerance) else 1
-            panel.imshow(picture, cmap="RdBu", vmin=-reach, vmax=reach)
-            name += f", ±{100 * reach:g} %"
-        else:
-            panel.imshow(image.to_bytes(np.asarray(picture)), cmap="gray", vmin=0, vmax=255)
+    """Cost against deviation of every option, a panel a material, above the pictures side by side: PNG."""
+    names = list(dict.fromkeys(step.material for step in result.steps))
+    plot = Figure(figsize=(max(9, 2.6 * len(names)), 6), layout="constrained")
+    above, below = plot.subfigures(2, 1, squeeze=False, height_ratios=[1.25, 1])[:, 0]
+    panels = above.subplots(1, len(names), sharex=True, sharey=True, squeeze=False)[0]
+    for panel, name in zip(panels, names, strict=True):
+        _speed_against_error(panel, result, name)
+    panels[0].set_ylabel("formulas, times the richest's time", fontsize=8)
+    handles = [Line2D([], [], marker=mark, ls="", color="0.3", ms=4, label=axis) for axis, mark in _MARKS.items()]
+    above.legend(handles=handles, loc="outside upper center", ncols=len(handles), fontsize=7, frameon=False)
+    above.supxlabel("deviation from the richest [%]; red line: the tolerance; filled: chosen", fontsize=8)
+    _side_by_side(below, result)
+    return image.figure_bytes(plot, dpi=130)
+
+
+def _speed_against_error(panel: Axes, result: Result, name: str) -> None:
+    labels: dict[tuple[float, float], list[str]] = {}
+    for step in (s for s in result.steps if s.material == name and math.isfinite(s.deviation.value)):
+        x, y = max(100 * step.deviation.value, 1e-3), step.ns / result.costs[name]
+        chosen = getattr(result.chosen[name], step.axis) == step.option
+        look = {"color": "tab:blue", "zorder": 3} if chosen else {"color": "0.3", "mfc": "white"}
+        panel.plot(x, y, _MARKS[step.axis], ms=5, **look)
+        labels.setdefault((x, y), []).append(step.option)
+    for at, options in labels.items():
+        panel.annotate(", ".join(options), at, fontsize=6, xytext=(4, 3), textcoords="offset points")
+    panel.axhline(1, color="0.7", lw=0.8, zorder=0)
+    if result.tolerance > 0:
+        panel.axvline(100 * result.tolerance, color="tab:red", lw=1, zorder=0)
+    panel.set(xscale="log", yscale="log")
+    panel.set_xlim(5e-4, 1e3)
+    panel.set_title(name, fontsize=8)
+    panel.tick_params(labelsize=7, which="both")
+    panel.yaxis.set_major_formatter("{x:g}")
+    panel.yaxis.set_minor_formatter("{x:g}")
+
+
+def _side_by_side(part: SubFigure, result: Result) -> None:
+    richest, chosen = (result.pictures[name].mean for name in ("richest", "chosen"))
+    reach = max(10 * result.tolerance, 0.01)
+    panels = part.subplots(1, 3, squeeze=False)[0]
+    for panel, name, picture in zip(panels, ("richest", "chosen"), (richest, chosen), strict=False):
+        panel.imshow(image.to_bytes(np.asarray(picture)), cmap="gray", vmin=0, vmax=255)
         panel.set_title(name, fontsize=8)
+    panels[2].imshow((chosen - richest) / richest.mean(), cmap="RdBu", vmin=-reach, vmax=reach)
+    panels[2].set_title(f"(chosen - richest) / mean, ±{100 * reach:g} %, with noise", fontsize=8)
+    for panel in panels:
         panel.set_axis_off()
-    return image.figure_bytes(plot)

@@ -28,23 +28,7 @@ def turn_library(x):
 
 def _polynomial(terms):
     """Taylor polynomials with so many terms each, on an eighth of a turn."""
-
-    def turn(x):
-        quarter = jnp.round(4 * x)
-        v = x - quarter / 4
-        square = (2 * math.pi * v) ** 2
-        c = sum((-1) ** k / math.factorial(2 * k) * square**k for k in range(terms))
-        s = 2 * math.pi * v * sum((-1) ** k / math.factorial(2 * k + 1) * square**k for k in range(terms))
-        swap = (quarter == 1) | (quarter == 3)
-        c, s = jnp.where(swap, s, c), jnp.where(swap, c, s)
-        return jnp.stack(
-            [
-                jnp.where((quarter == 1) | (quarter == 2), -c, c),
-                jnp.where((quarter == 2) | (quarter == 3), -s, s),
-            ]
-        )
-
-    return turn
+    return lambda x: jnp.stack(stable.cos_sin_turn(x, terms))
 
 
 def _unit(x, y, z):
