@@ -212,8 +212,8 @@ def _speed_against_error(panel: Axes, result: Result, name: str) -> None:
     for step in (s for s in result.steps if s.material == name and math.isfinite(s.deviation.value)):
         x, y = max(100 * step.deviation.value, 1e-3), step.ns / result.costs[name]
         chosen = getattr(result.chosen[name], step.axis) == step.option
-        look = {"color": "tab:blue", "zorder": 3} if chosen else {"color": "0.3", "mfc": "white"}
-        panel.plot(x, y, _MARKS[step.axis], ms=5, **look)
+        color, face, order = ("tab:blue", "tab:blue", 3) if chosen else ("0.3", "white", 2)
+        panel.plot(x, y, _MARKS[step.axis], ms=5, color=color, mfc=face, zorder=order)
         labels.setdefault((x, y), []).append(step.option)
     for at, options in labels.items():
         panel.annotate(", ".join(options), at, fontsize=6, xytext=(4, 3), textcoords="offset points")
