@@ -1,88 +1,209 @@
 """Do fits of synthetic data find what made them, do their intervals hold it 95 times in 100, and is the right model chosen?
 
-    python experiments/fit_recovery.py --trials 500 --ladders 100
+    python experiments/fit_recovery.py intervals --trials 2000 --seed 1 --page docs/fitting.md
+    python experiments/fit_recovery.py choice --trials 300 --seed 2 --page docs/fitting.md
+    python experiments/fit_recovery.py skew --trials 100 --seed 3 --page docs/fitting.md
 
-Reflectance: 960 directions, five incident; lognormal noise of 10 %. A trial is one draw of the noise.
+Reflectance: 960 directions, five incident; slopes: 8192 independent ones. A trial is one draw of the noise. Each part writes its
+table between its two marks of the page.
 """
 
 import argparse
+import math
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+import scipy.stats
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 import fit_data
 
-from ggxref.fit import parameters, selection
+from ggxref.errors import InputError
+from ggxref.files import write_atomically
+from ggxref.fit import models, objectives, parameters, selection, solver
 from ggxref.fit.data import Reflectance, Source, direction
-from ggxref.fit.fitting import fit_many
+from ggxref.fit.fitting import TAILS, Fit, fit_many
 from ggxref.fit.models import Surface
-from ggxref.fit.problem import Problem, from_reflectance
+from ggxref.fit.parameters import Model
+from ggxref.fit.problem import Problem, from_reflectance, from_slopes
+from ggxref.fit.slopes import TILES, Slopes
 
+MEAN, ROUND = (0.0, 0.0), ((0.04, 0.0), (0.0, 0.04))
 TRUTH = {
-    "isotropic": ((0.0, 0.0), ((0.04, 0.0), (0.0, 0.04))),
-    "anisotropic": ((0.0, 0.0), ((0.09, 0.0), (0.0, 0.01))),
-    "rotated": ((0.0, 0.0), ((0.06, 0.03), (0.03, 0.05))),
+    "isotropic": (MEAN, ROUND),
+    "anisotropic": (MEAN, ((0.09, 0.0), (0.0, 0.01))),
+    "rotated": (MEAN, ((0.06, 0.03), (0.03, 0.05))),
     "ellipsoid": ((0.06, -0.04), ((0.06, 0.03), (0.03, 0.05))),
 }
+"""Mean slope and scatter of what makes the data."""
+GAMMA = 3.0
 F0, DIFFUSE, NOISE = 0.6, 0.1, 0.1
-BATCH = 20
+BATCH = 50
+"""Problems side by side."""
+MODELS = {model.name: model for model in parameters.ladder(parameters.SHAPES, parameters.TAILS)}
 
 
-def problem(shape: str, exact: np.ndarray, degrees: np.ndarray, seed: int) -> Problem:
-    noise = np.exp(NOISE * np.random.default_rng([seed, list(TRUTH).index(shape)]).normal(size=len(exact)))
-    zenith_i, azimuth_i, zenith_o, azimuth_o = np.radians(degrees).T
+class Maker(NamedTuple):
+    """What makes the data: θ, its surface and model, the exact BRDF in directions, and the noise floor that a fit will find there."""
+
+    theta: np.ndarray
+    model: Model
+    wi: np.ndarray
+    wo: np.ndarray
+    exact: np.ndarray
+    floor: float
+
+
+def maker(model: Model, mean=None) -> Maker:
+    theta = truth(model, mean)
+    zenith_i, azimuth_i, zenith_o, azimuth_o = np.radians(fit_data.angles()).T
     wi, wo = direction(zenith_i, azimuth_i), direction(zenith_o, azimuth_o)
-    one = np.ones(len(exact))
-    data = Reflectance(wi, wo, (exact * noise)[:, None], one, one > 0, ("brdf",), Source("synthetic", "none", ""))
+    wm = (wi + wo) / np.linalg.norm(wi + wo, axis=1, keepdims=True)
+    with solver.float64():
+        exact = models.brdfs(theta, wi.T, wo.T, wm.T, Surface(tail=model.tail))[0]
+    return Maker(theta, model, wi, wo, exact, objectives.noise_floor(exact[:, None], wo))
+
+
+def truth(model: Model, mean=None) -> np.ndarray:
+    """θ of the model's shape in TRUTH."""
+    made, scatter = TRUTH[model.name.partition(" ")[0]]
+    C = np.linalg.cholesky(scatter)
+    gamma = GAMMA if model.tail == "student_t" else 2.0
+    values = (C[0, 0], C[1, 1], C[1, 0], *(made if mean is None else mean), gamma, F0, DIFFUSE)
+    return np.array([parameters.from_user(*each) for each in zip(parameters.names(("brdf",)), values, strict=True)])
+
+
+def problem(made: Maker, noise: str, key: list[int]) -> Problem:
+    """One draw. The noise is lognormal: of f cosθo + ε, as in the fit's residual, or of f "alone", down to 0; or there are slopes."""
+    random = np.random.default_rng(key)
+    if noise == "slopes":
+        return from_slopes(slopes(made, random))
+    floor = 0.0 if noise == "alone" else made.floor
+    cosine = made.wo[:, 2]
+    noisy = ((made.exact * cosine + floor) * np.exp(NOISE * random.normal(size=len(cosine))) - floor) / cosine
+    one = np.ones(len(cosine))
+    source = Source("synthetic", "none", "")
+    data = Reflectance(made.wi, made.wo, noisy[:, None], one, one > 0, ("brdf",), source)
     return from_reflectance(data, Surface(), min_cosine=0.05, most=4096)
 
 
-def truth(shape: str) -> dict[str, float]:
-    mean, scatter = TRUTH[shape]
-    C = np.linalg.cholesky(scatter)
-    found = {"alpha_x": C[0, 0], "alpha_y": C[1, 1], "shear": C[1, 0], "mean_x": mean[0], "mean_y": mean[1]}
-    return found | {"f0": F0, "diffuse": DIFFUSE}
+def slopes(made: Maker, random: np.random.Generator, count: int = 8192) -> Slopes:
+    """Independent slopes with GGX's tail: a normal over the root of an exponential variable."""
+    mean, scatter = TRUTH[made.model.name]
+    normal = random.normal(size=(count, 2)) @ np.linalg.cholesky(scatter).T / math.sqrt(2)
+    return Slopes(normal / np.sqrt(random.exponential(size=(count, 1))) + mean, np.arange(count) % TILES**2, 0)
+
+
+def fits(made: Maker, noise: str, ladder: list[Model], trials: int, key: list[int]) -> Iterator[tuple[Fit, ...]]:
+    for start in range(0, trials, BATCH):
+        several = [problem(made, noise, [*key, k]) for k in range(start, min(start + BATCH, trials))]
+        yield from fit_many(several, ladder, [{}] * len(several))
+
+
+CASES = (
+    *(("floor", shape) for shape in TRUTH),
+    ("floor", "ellipsoid beckmann"),
+    ("floor", "ellipsoid student_t"),
+    ("slopes", "ellipsoid"),
+    ("alone", "isotropic"),
+)
+TITLES = {"floor": "", "slopes": ", slopes", "alone": ", noise of f alone"}
+
+
+def intervals(trials: int, seed: int) -> Iterator[str]:
+    yield "| made by | parameter | bias / error of a fit | bias / its own error | intervals that hold it | all biases 0: p |"
+    yield "|---|---|---|---|---|---|"
+    for number, (noise, name) in enumerate(CASES):
+        made = maker(MODELS[name])
+        found = [each for (each,) in fits(made, noise, [made.model], trials, [seed, number])]
+        # An isotropic model's two alphas are one.
+        free = [int(k) for k in np.flatnonzero(found[0].space.moved) if k != 1 or not name.startswith("isotropic")]
+        names = [parameters.names(("brdf",))[k] for k in free]
+        off = np.array([each.theta[free] - made.theta[free] for each in found])
+        held = np.mean([covered(each, made.theta, free, names) for each in found], axis=0)
+        spread = off.std(axis=0, ddof=1)
+        mean = off.mean(axis=0)
+        for k, parameter in enumerate(names):
+            yield (
+                f"| {name}{TITLES[noise]} | {parameter} | {mean[k] / spread[k]:+.3f} | "
+                f"{mean[k] / spread[k] * math.sqrt(trials):+.2f} | {100 * held[k]:.1f} % | {hotelling(off) if not k else ''} |"
+            )
+
+
+def covered(fit: Fit, theta: np.ndarray, free: list[int], names: list[str]) -> list[bool]:
+    ends = [[parameters.from_user(name, end) for end in fit.intervals[name]] for name in names]
+    return [low <= theta[k] <= high for k, (low, high) in zip(free, ends, strict=True)]
+
+
+def hotelling(off: np.ndarray) -> str:
+    """The probability of a mean as far from 0 in any direction, were all biases 0."""
+    n, p = off.shape
+    mean = off.mean(axis=0)
+    square = n * mean @ np.linalg.solve(np.atleast_2d(np.cov(off.T)), mean)
+    return f"{scipy.stats.f.sf(square * (n - p) / (p * (n - 1)), p, n - p):.2f}"
+
+
+def choice(trials: int, seed: int) -> Iterator[str]:
+    ladder = parameters.ladder(parameters.SHAPES, TAILS)
+    yield f"| made by, of {trials} | chosen: that model | a smaller one that it holds | another |"
+    yield "|---|---|---|---|"
+    for number, name in enumerate([*TRUTH, "isotropic student_t", "ellipsoid student_t"]):
+        made = maker(MODELS[name])
+        chosen = [chosen_of(each) for each in fits(made, "floor", ladder, trials, [seed, number])]
+        groups = {model.name: {n for group in model.groups for n in group} for model in ladder}
+        smaller = [each != name and groups[each] <= groups[name] for each in chosen]
+        others = {each: chosen.count(each) for each in chosen if each != name and not groups[each] <= groups[name]}
+        said = ", ".join(f"{each}: {count}" for each, count in sorted(others.items(), key=lambda item: -item[1]))
+        yield f"| {name} | {chosen.count(name)} | {sum(smaller)} | {said or 0} |"
+
+
+def chosen_of(ladder: tuple[Fit, ...]) -> str:
+    return selection.choose([fit.model.name for fit in ladder], np.stack([fit.held_out for fit in ladder]))
+
+
+SKEWS = (0.0, 0.001, 0.002, 0.003, 0.004, 0.006, 0.008)
+
+
+def skew(trials: int, seed: int) -> Iterator[str]:
+    ladder = parameters.ladder(parameters.SHAPES, ["ggx"])
+    yield "| mean slope | in its standard errors | ellipsoid chosen |"
+    yield "|---|---|---|"
+    for number, size in enumerate(SKEWS):
+        made = maker(MODELS["ellipsoid"], (0.8 * size, -0.6 * size))
+        found = list(fits(made, "floor", ladder, trials, [seed, number]))
+        error = math.sqrt(np.mean([each[-1].covariance[3, 3] + each[-1].covariance[4, 4] for each in found]) / 2)
+        share = np.mean([chosen_of(each) == "ellipsoid" for each in found])
+        yield f"| {size:g} | {size / error:.1f} | {100 * share:.0f} % |"
+
+
+PARTS = {"intervals": intervals, "choice": choice, "skew": skew}
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("part", choices=PARTS)
     parser.add_argument("--trials", type=int, default=500)
-    parser.add_argument("--ladders", type=int, default=100, help="trials of the whole ladder, a shape")
-    parser.add_argument("--shapes", default=",".join(TRUTH), help="of what makes the data")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--page", type=Path, help="write the table into this page too")
     given = parser.parse_args()
-    degrees = fit_data.angles()
-    ladder = parameters.ladder(parameters.SHAPES, ["ggx"])
-    print("| made by | parameter | bias / its standard error | intervals that hold it |\n|---|---|---|---|")
-    chosen: dict[str, list[str]] = {}
-    for model in (each for each in ladder if each.name in given.shapes.split(",")):
-        exact = fit_data.brdf(degrees, fit_data.shape(*TRUTH[model.name]), F0, DIFFUSE)
-        values, inside = [], []
-        expected = truth(model.name)
-        for start in range(0, given.trials, BATCH):
-            problems = [
-                problem(model.name, exact, degrees, seed) for seed in range(start, min(start + BATCH, given.trials))
-            ]
-            for (found,) in fit_many(problems, [model], [{}] * len(problems)):
-                free = [n for n, moved in zip(problems[0].parameters, found.space.moved, strict=True) if moved]
-                values.append([found.values[name] - expected[name] for name in free])
-                inside.append([found.intervals[name][0] <= expected[name] <= found.intervals[name][1] for name in free])
-        off = np.mean(values, axis=0) / (np.std(values, axis=0, ddof=1) / np.sqrt(len(values)))
-        for name, bias, share in zip(free, off, np.mean(inside, axis=0), strict=True):
-            print(f"| {model.name} | {name} | {bias:+.2f} | {100 * share:.1f} % |", flush=True)
-        chosen[model.name] = []
-        for start in range(0, given.ladders, BATCH):
-            problems = [
-                problem(model.name, exact, degrees, 10**6 + k) for k in range(start, min(start + BATCH, given.ladders))
-            ]
-            for fits in fit_many(problems, ladder, [{}] * len(problems)):
-                losses = np.stack([fit.held_out for fit in fits])
-                chosen[model.name].append(selection.choose([fit.model.name for fit in fits], losses))
-    print("\n| made by | " + " | ".join(model.name for model in ladder) + " |\n" + "|---" * 5 + "|")
-    for made, names in chosen.items():
-        print(f"| {made} | " + " | ".join(str(names.count(model.name)) for model in ladder) + " |")
+    lines = []
+    for line in PARTS[given.part](given.trials, given.seed):
+        print(line, flush=True)
+        lines.append(line)
+    if given.page:
+        write(given.page, given.part, lines)
+
+
+def write(page: Path, part: str, lines: list[str]) -> None:
+    begin, end = f"<!-- {part}: experiments/fit_recovery.py -->\n", f"<!-- end {part} -->\n"
+    before, mark, rest = page.read_text(encoding="utf-8").partition(begin)
+    if not mark:
+        raise InputError(f"{page} has no line {begin.strip()}")
+    write_atomically(page, before + begin + "\n".join(lines) + "\n" + end + rest.partition(end)[2])
 
 
 if __name__ == "__main__":
