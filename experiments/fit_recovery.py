@@ -48,7 +48,7 @@ MODELS = {model.name: model for model in parameters.ladder(parameters.SHAPES, pa
 
 
 class Maker(NamedTuple):
-    """What makes the data: θ, its surface and model, the exact BRDF in directions, and the noise floor that a fit will find there."""
+    """What makes the data: θ, its surface and model, the exact BRDF in directions, and the noise floor."""
 
     theta: np.ndarray
     model: Model
@@ -65,7 +65,21 @@ def maker(model: Model, mean=None) -> Maker:
     wm = (wi + wo) / np.linalg.norm(wi + wo, axis=1, keepdims=True)
     with solver.float64():
         exact = models.brdfs(theta, wi.T, wo.T, wm.T, Surface(tail=model.tail))[0]
-    return Maker(theta, model, wi, wo, exact, objectives.noise_floor(exact[:, None], wo))
+    return Maker(theta, model, wi, wo, exact, floor(exact, wo))
+
+
+def floor(exact: np.ndarray, wo: np.ndarray) -> float:
+    """The ε with which `noisy` makes data in which a fit finds ε again, on average over draws."""
+    draws = np.random.default_rng(0).normal(size=(50, len(exact)))
+    found = objectives.noise_floor(exact[:, None], wo)
+    for _ in range(30):
+        found = float(np.mean([objectives.noise_floor(noisy(exact, wo, found, draw)[:, None], wo) for draw in draws]))
+    return found
+
+
+def noisy(exact: np.ndarray, wo: np.ndarray, floor: float, normal: np.ndarray) -> np.ndarray:
+    """f with lognormal noise of f cosθo + ε."""
+    return ((exact * wo[:, 2] + floor) * np.exp(NOISE * normal) - floor) / wo[:, 2]
 
 
 def truth(model: Model, mean=None) -> np.ndarray:
@@ -82,12 +96,10 @@ def problem(made: Maker, noise: str, key: list[int]) -> Problem:
     random = np.random.default_rng(key)
     if noise == "slopes":
         return from_slopes(slopes(made, random))
-    floor = 0.0 if noise == "alone" else made.floor
-    cosine = made.wo[:, 2]
-    noisy = ((made.exact * cosine + floor) * np.exp(NOISE * random.normal(size=len(cosine))) - floor) / cosine
-    one = np.ones(len(cosine))
+    one = np.ones(len(made.wo))
+    values = noisy(made.exact, made.wo, 0.0 if noise == "alone" else made.floor, random.normal(size=len(one)))
     source = Source("synthetic", "none", "")
-    data = Reflectance(made.wi, made.wo, noisy[:, None], one, one > 0, ("brdf",), source)
+    data = Reflectance(made.wi, made.wo, values[:, None], one, one > 0, ("brdf",), source)
     return from_reflectance(data, Surface(), min_cosine=0.05, most=4096)
 
 
@@ -154,15 +166,22 @@ def choice(trials: int, seed: int) -> Iterator[str]:
     for number, name in enumerate([*TRUTH, "isotropic student_t", "ellipsoid student_t"]):
         made = maker(MODELS[name])
         chosen = [chosen_of(each) for each in fits(made, "floor", ladder, trials, [seed, number])]
-        groups = {model.name: {n for group in model.groups for n in group} for model in ladder}
-        smaller = [each != name and groups[each] <= groups[name] for each in chosen]
-        others = {each: chosen.count(each) for each in chosen if each != name and not groups[each] <= groups[name]}
+        smaller = [each != name and holds(name, each) for each in chosen]
+        others = {each: chosen.count(each) for each in chosen if each != name and not holds(name, each)}
         said = ", ".join(f"{each}: {count}" for each, count in sorted(others.items(), key=lambda item: -item[1]))
         yield f"| {name} | {chosen.count(name)} | {sum(smaller)} | {said or 0} |"
 
 
+def holds(large: str, small: str) -> bool:
+    """Is the second model a case of the first?"""
+    shapes = list(TRUTH)
+    (shape, _, tail), (other, _, its_tail) = large.partition(" "), small.partition(" ")
+    return shapes.index(other) <= shapes.index(shape) and its_tail in ("", tail)
+
+
 def chosen_of(ladder: tuple[Fit, ...]) -> str:
-    return selection.choose([fit.model.name for fit in ladder], np.stack([fit.held_out for fit in ladder]))
+    names, losses, blocks = zip(*((fit.model.name, fit.held_out, fit.held_out_blocks) for fit in ladder), strict=True)
+    return selection.choose(names, np.stack(losses), blocks=np.stack(blocks))
 
 
 SKEWS = (0.0, 0.001, 0.002, 0.003, 0.004, 0.006, 0.008)

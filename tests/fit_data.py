@@ -2,6 +2,7 @@
 
 import io
 import zipfile
+from functools import partial
 from pathlib import Path
 
 import jax
@@ -35,18 +36,20 @@ def direction(zenith, azimuth):
     return np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), np.cos(zenith)], axis=-1)
 
 
+@jax.jit
+@partial(jax.vmap, in_axes=(0, 0, None, None, None))
+def _brdf(wi, wo, A, f0, diffuse):
+    wm = geometry.half_reflection(wi, wo)
+    g2 = masking.g2_height_correlated(masking.g1_ellipsoid(wi, wm, A), masking.g1_ellipsoid(wo, wm, A))
+    return bsdf.brdf(wi, wo, ndf.ellipsoid(wm, A), g2, fresnel.schlick(jnp.dot(wi, wm), f0)) + diffuse / jnp.pi
+
+
 def brdf(degrees: np.ndarray, A: np.ndarray, f0: float, diffuse: float) -> np.ndarray:
     """(n,): the BRDF from `ndf.ellipsoid`, `masking.g1_ellipsoid` and Schlick's F, plus a diffuse term."""
-
-    def one(wi, wo, A):
-        wm = geometry.half_reflection(wi, wo)
-        g2 = masking.g2_height_correlated(masking.g1_ellipsoid(wi, wm, A), masking.g1_ellipsoid(wo, wm, A))
-        return bsdf.brdf(wi, wo, ndf.ellipsoid(wm, A), g2, fresnel.schlick(jnp.dot(wi, wm), f0)) + diffuse / jnp.pi
-
     zenith_i, azimuth_i, zenith_o, azimuth_o = np.radians(degrees).T
     with solver.float64():
         wi, wo = jnp.asarray(direction(zenith_i, azimuth_i)), jnp.asarray(direction(zenith_o, azimuth_o))
-        return np.asarray(jax.vmap(one, (0, 0, None))(wi, wo, jnp.asarray(A)))
+        return np.asarray(_brdf(wi, wo, jnp.asarray(A), jnp.asarray(f0), jnp.asarray(diffuse)))
 
 
 def shape(mean=(0.0, 0.0), scatter=((0.04, 0.0), (0.0, 0.04))) -> np.ndarray:

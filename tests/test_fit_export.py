@@ -26,7 +26,7 @@ def ladder(theta, shape="rotated", tail="ggx", masking="separable") -> Ladder:
     model = parameters.Model(shape, parameters.SHAPES[shape], tail)
     fit = Fit(
         model=model, tail=tail, space=space, identified=space, theta=theta, covariance=none, values=values, errors=errors,
-        loss=1.0, held_out=np.array([1.0, 1.0]), bic=0.0, log_rmse=0.1, agreeing=(1, 1), intervals={}, correlation=none,
+        loss=1.0, held_out=np.array([1.0, 1.0]), held_out_blocks=np.ones(2), bic=0.0, log_rmse=0.1, agreeing=(1, 1), intervals={}, correlation=none,
         at_bound=(), residuals=np.zeros((1, 1)), trouble="",
     )  # fmt: skip
     one = np.ones((1, 3))

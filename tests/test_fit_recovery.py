@@ -1,5 +1,6 @@
 """Fits of synthetic measurements find the parameters that made them, know how sure they are, and choose that model."""
 
+from dataclasses import replace
 from typing import cast
 
 import fit_data
@@ -8,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from ggxref.errors import InputError
-from ggxref.fit import models, parameters, selection, solver
+from ggxref.fit import bootstrap, identification, models, parameters, residual_map, selection, solver, sphere
 from ggxref.fit.data import Heights, Reflectance, Source, direction
 from ggxref.fit.fitting import fit, fit_models
 from ggxref.fit.models import Surface
@@ -98,6 +99,31 @@ class TestReflectance:
     def test_the_model_that_made_it_is_chosen(self, ladder, model):
         assert ladder.chosen == model
 
+    def test_the_bootstrap_agrees_with_the_standard_errors(self, ladder):
+        """Forty draws: their standard deviation is sure to 1/sqrt(80), 11 %, and a draw of blocks is a coarser measure than that."""
+        fit = ladder.best
+        found = bootstrap.intervals(ladder, 40)
+        free = [n for n, moved in zip(ladder.problem.parameters, fit.space.moved, strict=True) if moved]
+        for name in free:
+            low, high = found[name]
+            assert low < fit.values[name] < high
+            assert 0.4 < (high - low) / np.subtract(*fit.intervals[name][::-1]) < 1.6
+        assert all(low == high for name, (low, high) in found.items() if fit.errors[name] == 0)
+
+    def test_the_residual_map_keeps_the_sign(self, ladder):
+        left = residual_map.residuals(ladder, ladder.best)
+        wi, wo, wm, measured, noise = ladder.problem.samples
+        # A tenth of relative noise, less where the floor is most of a sample.
+        expected = 0.1 / np.log(10) * measured * wo[2] / (measured * wo[2] + noise)
+        assert left.std() == pytest.approx(np.sqrt(np.mean(expected**2)), rel=SURE * 0.023)
+        darker = replace(ladder, problem=replace(ladder.problem, samples=(wi, wo, wm, measured / 10, noise / 1e6)))
+        # What was fitted is ten times what was measured.
+        assert np.median(residual_map.residuals(darker, ladder.best)) == pytest.approx(1, abs=0.02)
+
+    def test_a_lit_sphere_is_drawn(self, ladder):
+        assert sphere.unseen(ladder) == ""
+        assert len(sphere.draw(ladder).axes) == 4  # three panels and a colour bar
+
     def test_starts_agree(self, ladder):
         assert all(fit.agreeing[0] >= 2 for fit in ladder.fits)
 
@@ -145,6 +171,7 @@ class TestPlane:
         ladder = fit(data, tail="ggx")
         assert [fit.model.name for fit in ladder.fits] == ["isotropic", "ellipsoid"]
         assert ladder.chosen == "isotropic"
+        assert "one plane" in sphere.unseen(ladder)
         assert_recovers(ladder.best, truth("isotropic") | {"f0": 0.6, "diffuse": 0.1})
 
     def test_a_turned_plane_is_the_same_fit(self):
@@ -216,6 +243,39 @@ class TestTrouble:
             fit(reflectance("isotropic", fit_data.angles()), **cast(dict, {option: "none"}))
 
 
+@pytest.fixture(scope="module")
+def sound():
+    return fit(reflectance("anisotropic", fit_data.angles()), model="anisotropic", tail="ggx")
+
+
+class TestWhatIsSaid:
+    """One sentence for all parameters of which it is true."""
+
+    def said(self, sound, **changes):
+        return identification.warnings(replace(sound, fits=(replace(sound.best, **changes),)))
+
+    def test_nothing_of_a_sound_fit(self, sound):
+        assert self.said(sound) == []
+
+    def test_bounds(self, sound):
+        assert self.said(sound, at_bound=("f0 r", "diffuse", "f0 g")) == [
+            "f0 r, f0 g ran to 0 or 1: held there, without a standard error",
+            "diffuse ran to 0: held there, without a standard error",
+        ]
+
+    def test_ties(self, sound):
+        correlation = np.eye(len(sound.problem.parameters))
+        correlation[0, 6] = correlation[6, 7] = -0.97
+        assert self.said(sound, correlation=correlation) == [
+            "hard to tell apart, by their correlation: alpha_x and f0 (-0.970), f0 and diffuse (-0.970)"
+        ]
+
+    def test_a_misfit(self, sound):
+        assert self.said(sound, log_rmse=2.0) == [
+            "no model here fits: the values are off by a factor of 7.39, e to the log-RMSE"
+        ]
+
+
 class TestTails:
     @pytest.mark.parametrize(("gamma", "name"), [(2.0, "rotated"), (3.5, "rotated student_t")])
     def test_the_tail_is_found(self, gamma, name):
@@ -285,6 +345,13 @@ class TestSpread:
 
 
 class TestChoose:
+    def test_folds_that_agree_by_chance_are_not_sure(self):
+        """Two folds show the same excess; the blocks within them tell how sure that is."""
+        folds = np.array([[1.1, 1.1], [1.0, 1.0]])
+        blocks = np.array([[1.6, 0.6, 1.5, 0.7], [1.0, 1.0, 1.0, 1.0]])
+        assert selection.choose(["small", "large"], folds) == "large"
+        assert selection.choose(["small", "large"], folds, blocks=blocks) == "small"
+
     def test_the_smallest_within_one_standard_error(self):
         best = np.array([1.0, 2.0, 3.0, 4.0])
         near, far = best + np.array([0.2, -0.1, 0.1, -0.1]), best + 0.1

@@ -2,6 +2,7 @@
 
 import fit_data
 import numpy as np
+import pytest
 
 from ggxref.fit import sphere
 from ggxref.fit.data import Reflectance, Source
@@ -9,6 +10,11 @@ from ggxref.fit.data import Reflectance, Source
 A = fit_data.shape()
 NOISE = 1e-6
 """Far below all values, so that nothing is floored."""
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch):
+    monkeypatch.setattr(sphere, "SIDE", 80)
 
 
 def measurement(zeniths):
@@ -48,3 +54,19 @@ def test_between_the_measured_directions():
     # A tenth of the incident range apart, f cosθo is nearly linear in its logarithm but at grazing angles.
     assert np.quantile(np.abs(error), 0.9) < 0.05
     assert not known[cosine < np.cos(np.radians(75.01))].any()
+
+
+def test_the_highlight_is_where_it_should_be():
+    """Turned by a right angle about the normal, the same values must miss: half vectors would be taken for others."""
+    data = measurement(ZENITHS)
+    turned = data.wo.copy()
+    turned[:, 0], turned[:, 1] = -data.wo[:, 1], data.wo[:, 0]
+    wrong = Reflectance(data.wi, turned, data.values, data.weights, data.mask, data.bands, data.source)
+    assert np.quantile(np.abs(off(wrong)[2]), 0.9) > 0.5
+
+
+def test_the_pixels_are_of_a_sphere():
+    lit, wi, wo = sphere.geometry(measurement(ZENITHS))
+    assert lit.sum() == wi.shape[1] and np.allclose(np.linalg.norm([wi, wo], axis=1), 1)
+    # The light stays at 45° from the eye, whatever the pixel.
+    assert np.allclose((wi * wo).sum(axis=0), sphere.LIGHT[2])

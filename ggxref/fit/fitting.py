@@ -35,7 +35,7 @@ class Fit:
     - `tail`: the formula used. `space`: the model's free directions, `identified` those that did not run to a bound.
     - `theta`: (p,), see `parameters`; `covariance` of θ, (p, p).
     - `values`, `errors`: of the parameters and of what follows from them, by name, in the user's terms.
-    - `loss`: the mean that was minimised; `held_out`: the same on each fold, fitted without it.
+    - `loss`: the mean that was minimised; `held_out`: the same on each fold, fitted without it, and `held_out_blocks` on each block.
     - `log_rmse`: of reflectance, over positive samples; NaN for slopes.
     - `agreeing`: how many starts, of how many, found this minimum. `trouble`: why the fit cannot be relied on, or "".
     """
@@ -50,6 +50,7 @@ class Fit:
     errors: dict[str, float]
     loss: float
     held_out: np.ndarray
+    held_out_blocks: np.ndarray
     bic: float
     log_rmse: float
     agreeing: tuple[int, int]
@@ -169,8 +170,10 @@ def fit_prepared(several: Sequence[Prepared]) -> list[Ladder]:
     ladders = []
     for each, fits in zip(several, found, strict=True):
         sound = [fit for fit in fits if not fit.trouble] or fits
-        losses = np.stack([fit.held_out for fit in sound])
-        chosen = selection.choose([fit.model.name for fit in sound], losses, each.tolerance)
+        losses, blocks = (
+            np.stack(part) for part in zip(*((fit.held_out, fit.held_out_blocks) for fit in sound), strict=True)
+        )
+        chosen = selection.choose([fit.model.name for fit in sound], losses, each.tolerance, blocks)
         ladders.append(Ladder(each.measurement, each.problem, fits, chosen))
     return ladders
 
@@ -281,6 +284,7 @@ def _fit(problem: Problem, model: Model, tail: str, space: Space, found: Found) 
         errors=errors,
         loss=found.loss,
         held_out=found.held_out,
+        held_out_blocks=found.held_out_blocks,
         bic=selection.bic(problem, found.loss, space.size),
         log_rmse=float(np.sqrt(np.nanmean(found.residuals**2))) if problem.surface else math.nan,
         agreeing=found.agreeing,

@@ -13,7 +13,8 @@ class Found(NamedTuple):
 
     - `space`: the directions that are free there, without those that ran to a bound. `theta`: (p,).
     - `loss` there, and `met`: whether the solver met its tolerance; `agreeing`: how many starts, of how many, ended there.
-    - `at`: the curvature there. `held_out`: (folds,), the mean loss on each fold at the minimum of the others.
+    - `at`: the curvature there. `held_out`: (folds,), the mean loss on each fold at the minimum of the others;
+      `held_out_blocks`: (blocks,), there on each block.
     - `residuals`: (n, bands), |log(f̂/f)|, NaN where f is not positive; of slopes empty.
     """
 
@@ -24,4 +25,5 @@ class Found(NamedTuple):
     agreeing: tuple[int, int]
     at: Curvature
     held_out: np.ndarray
+    held_out_blocks: np.ndarray
     residuals: np.ndarray

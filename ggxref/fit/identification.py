@@ -27,9 +27,7 @@ def _misfit(ladder: Ladder, fit: Fit) -> list[str]:
         return []
     if fit.log_rmse < FITS:
         return []
-    return [
-        f"no model here fits: the values are off by a factor of {math.exp(fit.log_rmse):.3g}, root mean square of the logarithm"
-    ]
+    return [f"no model here fits: the values are off by a factor of {math.exp(fit.log_rmse):.3g}, e to the log-RMSE"]
 
 
 def _rotation(fit: Fit) -> list[str]:
@@ -42,10 +40,11 @@ def _rotation(fit: Fit) -> list[str]:
 
 
 def _bounds(fit: Fit) -> list[str]:
-    return [
-        f"{name} ran to {END.get(name.partition(' ')[0], 'its end')}: held there, without a standard error"
-        for name in fit.at_bound
-    ]
+    """One sentence for all that ran to the same end."""
+    ran: dict[str, list[str]] = {}
+    for name in fit.at_bound:
+        ran.setdefault(END.get(name.partition(" ")[0], "its end"), []).append(name)
+    return [f"{', '.join(names)} ran to {end}: held there, without a standard error" for end, names in ran.items()]
 
 
 def _ties(ladder: Ladder, fit: Fit) -> list[str]:
@@ -53,9 +52,10 @@ def _ties(ladder: Ladder, fit: Fit) -> list[str]:
     # Parameters of one group move as one, which is no finding.
     one = [np.flatnonzero(column) for column in fit.space.basis.T]
     alone = [members[0] for members in one if len(members)]
-    return [
-        f"{names[i]} and {names[j]} are hard to tell apart: correlation {correlation[i, j]:.3f}"
+    tied = [
+        f"{names[i]} and {names[j]} ({correlation[i, j]:.3f})"
         for a, i in enumerate(alone)
         for j in alone[a + 1 :]
         if abs(correlation[i, j]) > TIED
     ]
+    return [f"hard to tell apart, by their correlation: {', '.join(tied)}"] if tied else []

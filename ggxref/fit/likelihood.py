@@ -42,6 +42,8 @@ def solve(problem: Problem, tail: str, space: Space, starts: np.ndarray) -> Foun
         agreeing=(int(np.sum(loss <= loss[best] + AGREE)), len(starts)),
         at=at,
         held_out=np.array(held_out),
+        # A tile of a curved surface has slopes of its own and no chance of the whole's; a fold has tiles of all rows and columns.
+        held_out_blocks=np.array(held_out),
         residuals=np.zeros((0, 0)),
     )
 

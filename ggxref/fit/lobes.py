@@ -66,7 +66,8 @@ def solve(bank: Bank, tail: str, spaces: list[Space], starts: list[np.ndarray]) 
             space=spaces[k],
             agreeing=(int(agreeing[k]), len(starts[k])),
             at=at[k][0],
-            held_out=held_out[k],
+            held_out=held_out[k][0],
+            held_out_blocks=held_out[k][1],
             residuals=_residuals(bank, surface, k, minima.theta[k]),
         )
         for k in range(len(spaces))
@@ -136,12 +137,13 @@ def _join(pieces: list[Each]) -> Each:
     return Each(*(np.concatenate(parts) for parts in zip(*pieces, strict=True)))
 
 
-def _held_out(bank: Bank, surface, theta: np.ndarray, spaces: list[Space], folds: list[_Folds]) -> list[np.ndarray]:
-    """Of each problem the mean loss on each fold, at the minimum of the other folds."""
+def _held_out(
+    bank: Bank, surface, theta: np.ndarray, spaces: list[Space], folds: list[_Folds]
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Of each problem the mean loss on each fold, at the minimum of the other folds, and there on each block."""
     begun = [_without(theta[k], spaces[k], folds[k]) for k in range(len(spaces))]
     owner = np.repeat(np.arange(len(begun)), [len(each) for each in begun])
     number = np.concatenate([np.arange(len(each)) for each in begun])
-    inside = [bank.of[k][bank.all.fold[bank.of[k]] == f] for k, f in zip(owner, number, strict=True)]
     outside = [bank.of[k][bank.all.fold[bank.of[k]] != f] for k, f in zip(owner, number, strict=True)]
     there = np.concatenate(begun)
     again = np.flatnonzero([bank.problems[k].size <= REFITTED for k in owner])
@@ -151,8 +153,18 @@ def _held_out(bank: Bank, surface, theta: np.ndarray, spaces: list[Space], folds
         there[again] = levenberg.minimise(
             lanes.terms, there[again], bases, lanes.samples, settled=NEARLY, most=FOLD_STEPS
         ).theta
-    loss = _lanes(surface, bank.all, inside).terms(there, np.arange(len(there))).loss
-    return [loss[owner == k] for k in range(len(spaces))]
+    return [_losses_of(bank, surface, k, there[owner == k]) for k in range(len(spaces))]
+
+
+def _losses_of(bank: Bank, surface, k: int, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The mean loss on each fold f of problem k at θ_f (folds, p), and there on each block."""
+    problem, which = bank.problems[k], bank.of[k]
+    found = rows.each(surface, theta[bank.all.fold[which]], bank.all, which, bank.all.weights[which])
+    index, loss = bank.all.index[which], np.concatenate([piece.losses.mean(axis=1) for piece in found])
+    every = np.empty(problem.size)
+    every[index[index >= 0]] = loss[index >= 0]
+    weights = problem.weights
+    return np.bincount(problem.fold, every * weights) / np.bincount(problem.fold, weights), problem.by_block(every)
 
 
 def _without(theta: np.ndarray, space: Space, folds: _Folds) -> np.ndarray:

@@ -44,6 +44,11 @@ class Problem:
     def size(self) -> int:
         return len(self.weights)
 
+    def by_block(self, losses: np.ndarray) -> np.ndarray:
+        """(blocks,): the weighted mean of the samples' losses in each block."""
+        _, block = np.unique(self.block, return_inverse=True)
+        return np.bincount(block, losses * self.weights) / np.bincount(block, self.weights)
+
 
 def from_reflectance(data: Reflectance, surface: Surface, *, min_cosine: float, most: int) -> Problem:
     """The BRDF's problem, over the samples whose two cosines with the normal exceed `min_cosine`, thinned to `most`."""

@@ -8,7 +8,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from ggxref.fit import identification, models, parameters, solver
+from ggxref.fit import identification, models, parameters, selection, solver
 from ggxref.fit.data import Heights
 from ggxref.fit.fitting import Fit, Ladder
 
@@ -39,7 +39,8 @@ def excess(ladder: Ladder, fit: Fit) -> tuple[float, float]:
     """Held-out loss above that of the model that has least of it, and the standard error of the difference."""
     least = min(ladder.fits, key=lambda other: other.held_out.mean())
     difference = fit.held_out - least.held_out
-    return float(difference.mean()), float(difference.std(ddof=1) / math.sqrt(len(difference)))
+    error = selection.standard_error(difference, fit.held_out_blocks - least.held_out_blocks)
+    return float(difference.mean()), error
 
 
 def _ladder(ladder: Ladder) -> Table:
