@@ -1,0 +1,103 @@
+"""What does a kernel cost beside Mitsuba's and beside a copy of its bytes, and what does it lose? Writes docs/speed-accuracy.md's table.
+
+    python experiments/kernels.py docs/speed-accuracy.md
+
+float32, one material (α = 0.3, 0.1), all kernels of a size in one interleaved run. Errors are the largest that sampling and
+search find in all regions. Mitsuba's `sample` returns the density too, and its conductor has three bands. Needs an idle
+machine; the extra `peers` for Mitsuba's columns.
+"""
+
+import sys
+from pathlib import Path
+
+from ggxref import bsdf, fresnel, geometry, masking, ndf, stable
+from ggxref.files import write_atomically
+from ggxref.measure import peers, speed, tables
+from ggxref.measure.accuracy import measure
+from ggxref.measure.reference import REFERENCES
+from ggxref.measure.regions import REGIONS
+from ggxref.sampling import bounded_cap, cross_section, spherical_cap
+
+MARKS = "<!-- kernels: experiments/kernels.py -->\n", "<!-- end kernels -->\n"
+SIZES = (1 << 16, 1 << 18, 1 << 20)
+POINTS = 1 << 15
+
+
+def conductor(wi, wo, alpha):
+    """D G2 F / (4 z_i z_o) of a metal."""
+    wm = geometry.half_reflection(wi, wo)
+    g2 = masking.g2_height_correlated(masking.g1_ggx(wi, wm, alpha), masking.g1_ggx(wo, wm, alpha))
+    F = fresnel.conductor(stable.cosine(wi, wm), 0.2, 3.9)
+    return bsdf.brdf(wi, wo, ndf.ggx(wm, alpha), g2, F)
+
+
+def half(wi, wo, alpha):
+    return geometry.half_reflection(wi, wo)
+
+
+# Kernel, Mitsuba's of the same, the name of its reference; all of a group take the same arguments.
+GROUPS = (
+    {
+        "spherical_cap.sample": (spherical_cap.sample, "mitsuba sample", "sampling.spherical_cap.sample"),
+        "bounded_cap.sample": (bounded_cap.sample, "mitsuba sample", "sampling.bounded_cap.sample"),
+        "cross_section.sample": (cross_section.sample, "mitsuba sample", "sampling.cross_section.sample"),
+    },
+    {"spherical_cap.pdf": (spherical_cap.pdf, "mitsuba pdf", "sampling.spherical_cap.pdf")},
+    {"ndf.ggx": (ndf.ggx, "mitsuba eval", "ndf.ggx")},
+    {"masking.g1_ggx": (masking.g1_ggx, "", "masking.g1_ggx")},
+    {
+        "half_reflection": (half, "", "geometry.half_reflection"),
+        "conductor: D G2 F / 4 z z": (conductor, "mitsuba conductor", ""),
+    },
+)
+
+
+def times(group: dict) -> dict[str, list[tuple[speed.Timing, float | None, float]]]:
+    """Per kernel and size: its timing, how many times faster than Mitsuba's, how many copies it takes."""
+    found: dict[str, list] = {name: [] for name in group}
+    for size in SIZES:
+        wanted = {theirs for _, theirs, _ in group.values()}
+        others = {name: call for name, call in peers.mitsuba(size).items() if name in wanted}
+        runs = speed.throughput({name: f for name, (f, _, _) in group.items()}, size, seconds=4, peers=others)
+        ran = {t.subject: t for t in runs}
+        for name, (_, theirs, _) in group.items():
+            ratio = ran[theirs].median / ran[name].median if theirs in ran else None
+            found[name].append((ran[name], ratio, ran[name].median / ran["copy"].median))
+    return found
+
+
+def error(name: str) -> str:
+    """p99.9 and the largest error of the library's function of that name, over all regions."""
+    f, reference = tables.library(name), REFERENCES[name]
+    graded = [measure(name, "", f, reference, region=region, count=POINTS, rounds=4) for region in REGIONS]
+    unit = "ulp" if graded[0].unit == "ulp" else "× 2⁻²⁴"
+    return f"{max(a.p999 for a in graded):.2g} {unit} | {max(a.worst for a in graded):.2g} {unit}"
+
+
+def table() -> str:
+    head = " | ".join(f"2^{size.bit_length() - 1} [ns]" for size in SIZES)
+    lines = [
+        f"{speed.machine()}; medians, lower quartile in brackets; after them, how many times faster than Mitsuba.\n",
+        f"| kernel | {head} | time of a copy at 2^20 | p99.9 error | largest error found |",
+        "|---|" + "---|" * (len(SIZES) + 3),
+    ]
+    for group in GROUPS:
+        for name, sizes in times(group).items():
+            cells = [f"{t.median:.1f} [{t.lower:.1f}]" + (f", {ratio:.2f} ×" if ratio else "") for t, ratio, _ in sizes]
+            reference = group[name][2]
+            graded = error(reference) if reference else "|"
+            lines.append(f"| {name} | {' | '.join(cells)} | {sizes[-1][2]:.1f} × | {graded} |")
+            print(lines[-1], flush=True)
+    return "\n".join(lines) + "\n"
+
+
+def main(page: Path) -> None:
+    before, _, rest = page.read_text().partition(MARKS[0])
+    _, mark, after = rest.partition(MARKS[1])
+    if not mark:
+        raise SystemExit(f"{page}: wanted the marks {MARKS[0].strip()} and {MARKS[1].strip()}")
+    write_atomically(page, before + MARKS[0] + table() + MARKS[1] + after)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
