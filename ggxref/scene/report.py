@@ -73,30 +73,31 @@ def _grid(title: str, *columns: str) -> Table:
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     for column in columns:
         right = column.endswith(("%", "ns", "variances"))
-        table.add_column(column, justify="right" if right else "left", no_wrap=right)
+        table.add_column(column, justify="right" if right else "left", no_wrap=right, overflow="fold")
     return table
 
 
 def _choice(result: Result) -> Table:
-    shown = [axis for axis in (*AXES, "sampler") if any(_differs(result, name, axis) for name in result.chosen)]
-    table = _grid("Chosen (in brackets: the richest)", "material", *shown, "deviation %", "wasted today %")
+    """A row an axis on which the chosen differs from the richest."""
+    table = _grid(
+        "Chosen, and what of today's time at equal noise is wasted",
+        "material",
+        "axis",
+        "chosen",
+        "richest",
+        "deviation %",
+        "wasted %",
+    )
     saved = wasted(result)
     for name, deviation in result.deviations.items():
-        changes = [_change(result.chosen[name], result.richest[name], axis) if name in saved else "-" for axis in shown]
-        table.add_row(name, *changes, _percent(deviation), f"{100 * saved[name]:.0f}" if name in saved else "-")
-    kept = [axis for axis in AXES if axis not in shown]
-    if kept:
-        table.caption, table.caption_justify = f"The richest of every material is kept: {', '.join(kept)}.", "left"
+        chosen, richest = result.chosen[name], result.richest[name]
+        cells = [(key, getattr(chosen, key), getattr(richest, key)) for key in (*AXES, "sampler")]
+        changes = [each for each in cells if each[1] != each[2]] if name in saved else []
+        first = name, _percent(deviation), f"{100 * saved[name]:.0f}" if name in saved else "-"
+        for k, change in enumerate(changes or [("-", "the richest", "-")]):
+            title, *numbers = first if k == 0 else ("", "", "")
+            table.add_row(title, *change, *numbers)
     return table
-
-
-def _differs(result: Result, name: str, axis: str) -> bool:
-    return getattr(result.chosen[name], axis) != getattr(result.richest[name], axis)
-
-
-def _change(chosen: Choice, richest: Choice, key: str) -> str:
-    now, was = getattr(chosen, key), getattr(richest, key)
-    return now if now == was else f"{now} ({was})"
 
 
 def _verdict_on(result: Result, step: Step) -> str:
@@ -104,12 +105,12 @@ def _verdict_on(result: Result, step: Step) -> str:
         return "<- chosen"
     if step.deviation.most >= result.tolerance:
         return "beyond"
-    return "within, but dearer" if step.ns > DEARER * result.costs[step.material] else "within, alone"
+    return "dearer" if step.ns > DEARER * result.costs[step.material] else "within"
 
 
 def _steps(result: Result) -> Table:
-    columns = "material", "axis", "option", "deviation %", "formulas ns", "richest ns"
-    table = _grid("One option at a time, the rest the richest", *columns)
+    columns = "material", "axis", "option", "deviation %", "ns", "richest ns"
+    table = _grid("One option at a time, the rest the richest: deviation, nanoseconds of formulas", *columns)
     table.add_column("")
     for step in sorted(result.steps, key=lambda step: step.material):
         ns = f"{step.ns:.0f}", f"{result.costs[step.material]:.0f}"
@@ -119,10 +120,10 @@ def _steps(result: Result) -> Table:
 
 
 def _ups(result: Result) -> Table:
-    columns = "material", "axis", "step up", "deviation %", "then %", "formulas ns"
+    columns = "material", "from", "to", "deviation %", "then %", "ns"
     table = _grid("What each step up from the chosen would buy", *columns)
     for up in sorted(steps_up(result), key=lambda up: up.material):
-        cells = up.material, up.axis, f"{up.option} -> {up.richer}", _percent(up.deviation), _percent(up.left)
+        cells = up.material, up.option, up.richer, _percent(up.deviation), _percent(up.left)
         table.add_row(*cells, f"{up.richer_ns - up.ns:+.0f}")
     return table
 
