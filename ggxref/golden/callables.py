@@ -2,6 +2,7 @@
 
 import importlib
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -116,7 +117,7 @@ def ask(implementation: Implementation, tests: list[Test]) -> list[Any] | None:
     f, differentiate = found
     fmt = tests[0].fmt
     if implementation.jax:
-        return compiled(f, differentiate, tests, QUICK if implementation.quick else {})
+        return compiled(f, differentiate, tests, implementation.quick)
     return [guarded(f, {a: numbers(x, fmt) for a, x in t.inputs.items()}, fmt) for t in tests]
 
 
@@ -132,7 +133,16 @@ def guarded(f: Callable[..., Any], inputs: dict[str, Any], fmt: Format) -> Any:
 QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 0}
 
 
-def compiled(f: Callable[..., Any], differentiate: bool, tests: list[Test], options: dict[str, Any]) -> list[Any]:
+def processes(implementation: Implementation, groups: int) -> int:
+    """How many to work in. One more takes as long to start as a few functions to compile; an accelerator serves one."""
+    if not implementation.jax:
+        return 1
+    import jax
+
+    return max(1, min(os.cpu_count() or 1, groups // 8)) if jax.default_backend() == "cpu" else 1
+
+
+def compiled(f: Callable[..., Any], differentiate: bool, tests: list[Test], quick: bool) -> list[Any]:
     """All tests of the group at once, through `jax.jit(jax.vmap(f))`."""
     import jax
 
@@ -148,6 +158,7 @@ def compiled(f: Callable[..., Any], differentiate: bool, tests: list[Test], opti
 
     try:
         with jax.enable_x64(fmt.name == "f64"):
+            options = QUICK if quick and jax.default_backend() == "cpu" else {}
             result = jax.jit(jax.vmap(point), compiler_options=options)(inputs)
             return [bits_of(mapped(lambda x, i=i: np.asarray(x)[i], result), fmt) for i in range(len(tests))]
     except Exception as error:  # whatever somebody's code raises is its answer

@@ -1,6 +1,5 @@
 """Grading: all verdicts on an implementation, summed up by function, dtype and flag."""
 
-import os
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures.process import BrokenProcessPool
@@ -104,11 +103,9 @@ def of_python(
 ) -> Grade:
     answers: text.Answers = {}
     groups = list(text.groups(tests))
-    # A process more takes as long to start as a few functions to compile.
-    jobs = max(1, min(os.cpu_count() or 1, len(groups) // 8)) if implementation.jax else 1
     trouble = ""
     try:
-        with workers(jobs) as submit:
+        with workers(callables.processes(implementation, len(groups))) as submit:
             asked = [submit(callables.ask, implementation, group) for _, _, group in groups]
             for (function, fmt, group), answer_all in zip(groups, asked, strict=True):
                 given = answer_all()
