@@ -116,10 +116,15 @@ def to_float(x: fmpq) -> float:
     return int(x.p) / int(x.q)
 
 
+def spacing(x: fmpq, fmt: Format) -> fmpq:
+    """Distance between neighbours in the binade of `x`, were there no end to the exponents; at 0 and below the normal range,
+    the smallest subnormal."""
+    return power(max(binade(x), fmt.emin) - fmt.precision + 1 if x else fmt.quantum)
+
+
 def ulp(x: fmpq, fmt: Format) -> fmpq:
-    """Distance between neighbours in the binade of `x`; at 0 and below the normal range, the smallest subnormal."""
-    e = max(binade(x), fmt.emin) if x else fmt.emin
-    return power(min(e, fmt.emax) - fmt.precision + 1)
+    """`spacing`, beyond the largest finite number that of its binade."""
+    return min(spacing(x, fmt), power(fmt.emax - fmt.precision + 1))
 
 
 @cache

@@ -33,7 +33,7 @@ class Stream:
     def scale(self, low: fmpq | int, high: fmpq | int) -> fmpq:
         """Between `low` and `high`, as much of it in each octave: 2^k (1 + f), k and f uniform."""
         low, high = fmpq(low), fmpq(high)
-        octaves = math.ceil(fmpq(high / low)).bit_length()
+        octaves = math.ceil(high / low).bit_length()
         while True:
             x = low * 2 ** self.below(octaves) * self.uniform(1, 2)
             if x < high:
