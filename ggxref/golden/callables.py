@@ -3,22 +3,33 @@
 import importlib
 import json
 import os
+from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ggxref.errors import InputError
-from ggxref.golden.cases import mapped
 from ggxref.golden.catalogue import Function
 from ggxref.golden.reading import Test
 from ggxref.golden.rounding import Format
 from ggxref.golden.verdict import Failure
 
 WORDS = {64: np.uint64, 32: np.uint32, 16: np.uint16}
+
+
+@dataclass(frozen=True)
+class Found:
+    """A callable, its options, and whether it is to be differentiated still."""
+
+    function: Callable[..., Any]
+    options: tuple[tuple[str, Any], ...]
+    differentiate: bool
+
+    def __call__(self, **inputs: Any) -> Any:
+        return self.function(**inputs, **dict(self.options))
 
 
 @dataclass(frozen=True)
@@ -31,8 +42,8 @@ class Implementation:
     jax: bool
     quick: bool = False
 
-    def find(self, function: Function) -> tuple[Callable[..., Any], bool] | None:
-        """The callable for a catalogue entry, and whether it is to be differentiated still; None if there is none."""
+    def find(self, function: Function) -> Found | None:
+        """The callable for a catalogue entry; None if there is none."""
         for name, whole in ((function.id, True), (function.name, not function.derivative)):
             if name in self.mapping:
                 module, _, path = self.mapping[name].partition(":")
@@ -41,7 +52,7 @@ class Implementation:
                 found = attribute(self.module, name) if self.module and name == function.name else None
             if found is not None and (whole or self.jax):
                 options = {} if name in self.mapping and name == function.id else function.options
-                return partial(found, **options), not whole
+                return Found(found, tuple(options.items()), not whole)
         return None
 
 
@@ -109,16 +120,24 @@ def nested(x: Any) -> Any:
     return tuple(map(nested, x)) if isinstance(x, list) else x
 
 
-def ask(implementation: Implementation, tests: list[Test]) -> list[Any] | None:
-    """Answers to the tests of one function and dtype; None if the implementation has no such function."""
-    found = implementation.find(tests[0].function)
-    if found is None:
-        return None
-    f, differentiate = found
-    fmt = tests[0].fmt
+def together(implementation: Implementation, tests: list[Test]) -> list[list[Test]]:
+    """Tests by what answers them, without those that nothing does: a callable under several names is compiled once,
+    as are all its derivatives."""
+    found = {t.function.id: implementation.find(t.function) for t in tests}
+    jobs: dict[Any, list[Test]] = defaultdict(list)
+    for t in tests:
+        if f := found[t.function.id]:
+            jobs[f if implementation.jax else t.function.id, frozenset(t.inputs), t.fmt.name].append(t)
+    return list(jobs.values())
+
+
+def ask(implementation: Implementation, tests: list[Test]) -> list[Any]:
+    """Answers to tests of one callable and dtype."""
+    found, fmt = implementation.find(tests[0].function), tests[0].fmt
+    assert found is not None
     if implementation.jax:
-        return compiled(f, differentiate, tests, implementation.quick)
-    return [guarded(f, {a: numbers(x, fmt) for a, x in t.inputs.items()}, fmt) for t in tests]
+        return compiled(found, tests, implementation.quick)
+    return [guarded(found, {a: numbers(x, fmt) for a, x in t.inputs.items()}, fmt) for t in tests]
 
 
 def guarded(f: Callable[..., Any], inputs: dict[str, Any], fmt: Format) -> Any:
@@ -133,33 +152,40 @@ def guarded(f: Callable[..., Any], inputs: dict[str, Any], fmt: Format) -> Any:
 QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 0}
 
 
-def processes(implementation: Implementation, groups: int) -> int:
+def processes(implementation: Implementation, jobs: int) -> int:
     """How many to work in. One more takes as long to start as a few functions to compile; an accelerator serves one."""
     if not implementation.jax:
         return 1
     import jax
 
-    return max(1, min(os.cpu_count() or 1, groups // 8)) if jax.default_backend() == "cpu" else 1
+    return max(1, min(os.cpu_count() or 1, jobs // 8)) if jax.default_backend() == "cpu" else 1
 
 
-def compiled(f: Callable[..., Any], differentiate: bool, tests: list[Test], quick: bool) -> list[Any]:
-    """All tests of the group at once, through `jax.jit(jax.vmap(f))`."""
+def compiled(f: Found, tests: list[Test], quick: bool) -> list[Any]:
+    """All tests at once, through `jax.jit(jax.vmap(f))`."""
     import jax
 
-    function, fmt = tests[0].function, tests[0].fmt
-    inputs = {a: numbers([t.inputs[a] for t in tests], fmt) for a in function.arguments}
+    fmt = tests[0].fmt
+    inputs = {a: numbers([t.inputs[a] for t in tests], fmt) for a in tests[0].inputs}
+    by = {t.function.derivative for t in tests} if f.differentiate else set()
 
     def point(values: dict[str, Any]) -> Any:
-        if not differentiate:
+        if not f.differentiate:
             return f(**values)
-        rest = {a: x for a, x in values.items() if a != function.derivative}
-        value, slopes = jax.value_and_grad(lambda x: f(**rest, **{function.derivative: x}))(values[function.derivative])
-        return jax.numpy.concatenate([value[None], slopes.ravel()])
+        rest = {a: x for a, x in values.items() if a not in by}
+        return jax.value_and_grad(lambda some: f(**rest, **some))({a: values[a] for a in by})
+
+    def answer(result: Any, i: int) -> Any:
+        result = jax.tree.map(lambda x: x[i], result)
+        if not f.differentiate:
+            return bits_of(result, fmt)
+        value, slopes = result
+        return bits_of([value, *slopes[tests[i].function.derivative].ravel()], fmt)
 
     try:
         with jax.enable_x64(fmt.name == "f64"):
             options = QUICK if quick and jax.default_backend() == "cpu" else {}
-            result = jax.jit(jax.vmap(point), compiler_options=options)(inputs)
-            return [bits_of(mapped(lambda x, i=i: np.asarray(x)[i], result), fmt) for i in range(len(tests))]
+            result = jax.tree.map(np.asarray, jax.jit(jax.vmap(point), compiler_options=options)(inputs))
+            return [answer(result, i) for i in range(len(tests))]
     except Exception as error:  # whatever somebody's code raises is its answer
         return [Failure(f"{type(error).__name__}: {error}"[:200])] * len(tests)

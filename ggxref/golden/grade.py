@@ -102,22 +102,23 @@ def of_python(
     implementation: callables.Implementation, tests: list[Test], strict: bool, advance: Callable[[int], None]
 ) -> Grade:
     answers: text.Answers = {}
-    groups = list(text.groups(tests))
+    jobs = callables.together(implementation, tests)
+    examples = {(function.id, fmt.name): text.like(group) for function, fmt, group in text.groups(tests)}
     trouble = ""
     try:
-        with workers(callables.processes(implementation, len(groups))) as submit:
-            asked = [submit(callables.ask, implementation, group) for _, _, group in groups]
-            for (function, fmt, group), answer_all in zip(groups, asked, strict=True):
-                given = answer_all()
-                for test, answer in zip(group, given or [], strict=given is not None):
-                    answers[function.id, fmt.name, test.id] = fitting(answer, test, text.like(group))
-                advance(len(group))
+        with workers(callables.processes(implementation, len(jobs))) as submit:
+            asked = [submit(callables.ask, implementation, job) for job in jobs]
+            for job, answer_all in zip(jobs, asked, strict=True):
+                for test, answer in zip(job, answer_all(), strict=True):
+                    group = test.function.id, test.fmt.name
+                    answers[*group, test.id] = fitting(answer, examples[group])
+                advance(len(job))
     except BrokenProcessPool:
         trouble = "the functions ended the process that called them"
     return collect(tests, answers, strict, trouble)
 
 
-def fitting(answer: Any, test: Test, example: Any) -> Any:
+def fitting(answer: Any, example: Any) -> Any:
     """The answer, if it is nested as a result."""
     if isinstance(answer, Failure) or shape(answer) == shape(example):
         return answer
