@@ -21,6 +21,11 @@ Components = Float[Array, " n"] | tuple[Float[Array, "..."], ...]
 _HIGH = {jnp.dtype("float32"): (jnp.uint32, 0xFFFFF000), jnp.dtype("float64"): (jnp.uint64, 0xFFFFFFFFF8000000)}
 
 
+# Traced once for each dtype and shape, wherever it is used.
+_traced_once = functools.partial(jax.jit, inline=True)
+
+
+@_traced_once
 def _split(a):
     """`a` as the exact sum of a high half and a low half, each short enough for products without rounding.
 
@@ -31,12 +36,14 @@ def _split(a):
     return high, a - high
 
 
+@_traced_once
 def _two_product(a, b):
     p = a * b
     (ah, al), (bh, bl) = _split(a), _split(b)
     return p, ((ah * bh - p) + ah * bl + al * bh) + al * bl
 
 
+@_traced_once
 def _two_sum(a, b):
     s = a + b
     t = s - a
@@ -183,6 +190,7 @@ def _scaled_square_jvp(primals, tangents):
     return _scaled_square(*primals), 2 * (ax * x * (ax * dx + x * dax) + ay * y * (ay * dy + y * day))
 
 
+@_traced_once
 def _quotient(x, a):
     q = x / a
     p, error = _two_product(q, a)

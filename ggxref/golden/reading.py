@@ -3,7 +3,7 @@
 import hashlib
 import json
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -60,9 +60,10 @@ class Test:
     outcomes: tuple[str, ...]
 
 
-def need(condition: object, message: str) -> None:
+def need(condition: object, message: str | Callable[[], str]) -> None:
+    """The message may be made on demand: most are never read."""
     if not condition:
-        raise InputError(message)
+        raise InputError(message if isinstance(message, str) else message())
 
 
 def object_of(text: bytes, where: str) -> dict[str, Any]:
@@ -84,9 +85,9 @@ def entry(record: dict[str, Any], key: str, wanted: type | tuple[type, ...], whe
     """`record[key]`, of the wanted type."""
     need(key in record, f"{where}: {key!r} is missing")
     value = record[key]
-    names = wanted.__name__ if isinstance(wanted, type) else " or ".join(t.__name__ for t in wanted)
     right = isinstance(value, wanted) and not isinstance(value, bool)
-    need(right, f"{where}: {key!r} wants {names}, got {kind(value)}")
+    types = wanted if isinstance(wanted, tuple) else (wanted,)
+    need(right, lambda: f"{where}: {key!r} wants {' or '.join(t.__name__ for t in types)}, got {kind(value)}")
     return value
 
 
@@ -110,7 +111,7 @@ def words(value: Any, fmt: Format, where: str) -> Any:
     """Bits of nested hex strings."""
     if isinstance(value, list):
         return tuple(words(part, fmt, where) for part in value)
-    need(isinstance(value, str), f"{where}: wanted a hex string, got {kind(value)}")
+    need(isinstance(value, str), lambda: f"{where}: wanted a hex string, got {kind(value)}")
     try:
         return from_hex(value, fmt)
     except ValueError as error:
@@ -125,19 +126,20 @@ def positive(record: dict[str, Any], key: str, where: str) -> float:
 
 def test(record: Any, function: Function, fmt: Format, flags: dict[str, str], where: str) -> Test:
     """A test from its JSON."""
-    need(isinstance(record, dict), f"{where}: wanted a JSON object, got {kind(record)}")
+    need(isinstance(record, dict), lambda: f"{where}: wanted a JSON object, got {kind(record)}")
     inputs = entry(record, "inputs", dict, where)
     wanted, got = set(function.arguments), set(inputs)
-    need(wanted == got, f"{where}: {function.name} takes {sorted(wanted)}, got {sorted(got)}")
+    need(wanted == got, lambda: f"{where}: {function.name} takes {sorted(wanted)}, got {sorted(got)}")
     for argument, quantity in function.arguments.items():
         shape, expected = shape_of(inputs[argument]), SHAPES.get(quantity, ())
-        need(shape == expected, f"{where}: {argument!r} wants shape {expected}, got {kind(inputs[argument])}")
+        if shape != expected:
+            raise InputError(f"{where}: {argument!r} wants shape {expected}, got {kind(inputs[argument])}")
     named = entry(record, "flags", list, where)
     for flag in named:
         need(isinstance(flag, str) and flag in flags, f"{where}: flag {flag!r} is not in the file's list")
     outcomes = record.get("outcomes", [])
     known = isinstance(outcomes, list) and set(map(str, outcomes)) <= set(ALL_OUTCOMES)
-    need(known, f"{where}: 'outcomes' wants a list of {', '.join(ALL_OUTCOMES)}, got {kind(outcomes)}")
+    need(known, lambda: f"{where}: 'outcomes' wants a list of {', '.join(ALL_OUTCOMES)}, got {kind(outcomes)}")
     inputs = {a: words(x, fmt, f"{where}, {a}") for a, x in inputs.items()}
     valued = not outcomes or "value" in outcomes
     answer = result(record, fmt, where) if valued else None

@@ -133,6 +133,9 @@ def power(exponent: int) -> fmpq:
     return fmpq(2) ** exponent
 
 
+HEXADECIMAL = frozenset("0123456789abcdef")
+
+
 def to_hex(bits: int, fmt: Format) -> str:
     """Bits as they stand in the files: `0x` and width/4 lower-case digits."""
     return f"0x{bits:0{fmt.width // 4}x}"
@@ -142,7 +145,7 @@ def from_hex(text: str, fmt: Format) -> int:
     """Bits of a hex string of exactly this format's width."""
     digits = fmt.width // 4
     body = text[2:]
-    if text[:2] != "0x" or len(body) != digits or not all(c in "0123456789abcdef" for c in body):
+    if text[:2] != "0x" or len(body) != digits or not HEXADECIMAL.issuperset(body):
         raise ValueError(f"{text!r} is not 0x and {digits} lower-case hex digits ({fmt.name})")
     return int(body, 16)
 
