@@ -1,13 +1,13 @@
 """dupuy2023 fig. 1 and table 1: which share of a picture's time goes into drawing visible normals, old method and new?
 
-    python experiments/sampling_share.py [--samples 128] [--out docs/figures]
+    python experiments/sampling_share.py [--samples 512] [--out docs/figures]
 
 Balls of a rough conductor, and of a rough dielectric, on a plate of the same, under a sky and a sun: one ball, eight and
 thirty-two, which a ray is tested against one after the other. [Hei18] is `cross_section`, (ours) `spherical_cap`.
 
-A sampler is timed by itself, at the renderer's number of lanes, less a stand-in that reads and writes the same numbers; the
-two and the stand-in in turns, the middle of the ratios to the renderer's time counting. Inside the renderer it cannot be
-timed: the compiler mixes it with what is around it. The picture's time is of a bounce: intersections, light sampling,
+A sampler is timed by itself, at the renderer's number of lanes, in a loop of its own random numbers, less a stand-in that
+reads and writes the same; both and the stand-in in turns, just before and after the picture. Inside the renderer it cannot
+be timed: the compiler mixes it with what is around it. The picture's time is of a bounce: intersections, light sampling,
 BSDF, and the direction drawn.
 """
 
@@ -20,6 +20,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from harness import row, still
+from jax import lax
 from matplotlib.figure import Figure
 
 from ggxref import sampling
@@ -33,7 +34,8 @@ ALPHA = (0.2, 0.2)
 COUNTS = (1, 8, 32)
 SAMPLERS = {"[Hei18]": "cross_section", "(ours)": "spherical_cap"}
 LIGHTS = (lights.Sky(still(0.2), still(0.8)), lights.Sun(still(0.48, -0.6, 0.64), still(math.radians(10)), still(10)))
-TURNS = 41
+TURNS = 21
+DRAWS = 64
 
 
 def balls(count: int) -> tuple[shapes.Shape, ...]:
@@ -46,19 +48,27 @@ def balls(count: int) -> tuple[shapes.Shape, ...]:
 
 
 def drawers() -> dict:
-    """Compiled: each sampler, and a stand-in for what it reads and writes."""
+    """Compiled: each sampler drawing `DRAWS` normals a lane, each seen along the one before; and a stand-in."""
     alpha = still(*ALPHA)
+    lane = jnp.arange(render.LANES, dtype=jnp.uint32)
 
     def nothing(u, wi, alpha):
         return wi + (u[0] + u[1]) * alpha[0]
 
     forms = {name: getattr(sampling, name).sample for name in SAMPLERS.values()} | {"nothing": nothing}
-    u, v = (jax.random.uniform(key, (2, render.LANES), jnp.float32) for key in jax.random.split(jax.random.key(0)))
-    wi = jax.vmap(materials.cosine_lobe, -1, -1)(v)
     kernels = {}
     for name, form in forms.items():
-        compiled = jax.jit(jax.vmap(form, (-1, -1, None), -1)).lower(u, wi, alpha).compile()
-        kernels[name] = lambda compiled=compiled: compiled(u, wi, alpha)
+
+        def draws(wi, alpha, form=form):
+            def draw(k, wi):
+                u = jnp.stack(render.uniforms(0, lane, k, 0)[:2])
+                return jax.vmap(form, (-1, -1, None), -1)(u, wi, alpha)
+
+            return lax.fori_loop(0, DRAWS, draw, wi)
+
+        wi = jax.vmap(materials.cosine_lobe, -1, -1)(jnp.stack(render.uniforms(1, lane, 0, 0)[:2]))
+        compiled = jax.jit(draws).lower(wi, alpha).compile()
+        kernels[name] = lambda compiled=compiled, wi=wi: compiled(wi, alpha)
     return kernels
 
 
@@ -71,7 +81,7 @@ def seconds(work) -> float:
 def sampler_times(kernels: dict) -> dict[str, float]:
     """Nanoseconds of a direction drawn, less the stand-in's."""
     times = np.array([[seconds(kernel) for kernel in kernels.values()] for _ in range(TURNS)])
-    middle = dict(zip(kernels, np.median(times, axis=0) / render.LANES * 1e9, strict=True))
+    middle = dict(zip(kernels, np.median(times, axis=0) / (render.LANES * DRAWS) * 1e9, strict=True))
     return {name: middle[name] - middle["nothing"] for name in SAMPLERS.values()}
 
 
@@ -91,7 +101,7 @@ def bounce_time(surface: str, sampler: str, count: int, samples: int, kernels: d
 
 def main() -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument("--samples", type=int, default=128)
+    parser.add_argument("--samples", type=int, default=512)
     parser.add_argument("--out", type=Path, default=Path("docs/figures"))
     arguments = parser.parse_args()
     kernels = drawers()

@@ -4,10 +4,11 @@ Rays are many (`vectors`).
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
-from jax import Array
+from jax import Array, lax
 
 from ggxref.scene.vectors import AnyVector, Vector, ahead, azimuth, dot, minus, root, scale, select
 
@@ -49,7 +50,7 @@ class Hit(NamedTuple):
     material: Array
 
 
-def _sphere(shape: Sphere, origin, direction):
+def _to_sphere(shape: Sphere, origin, direction):
     o = minus(origin, shape.center)
     b = dot(o, direction)
     # |o|² − r² and b² − c both cancel at a distance: the closest point to the centre does not.
@@ -57,19 +58,27 @@ def _sphere(shape: Sphere, origin, direction):
     square = shape.radius**2 - dot(across, across)
     half = root(square)
     near, far = -b - half, half - b
-    distance = jnp.where(square > 0, jnp.where(near > 0, near, jnp.where(far > 0, far, jnp.inf)), jnp.inf)
-    normal = scale(1 / shape.radius, ahead(o, jnp.where(jnp.isfinite(distance), distance, 0), direction))
+    return jnp.where(square > 0, jnp.where(near > 0, near, jnp.where(far > 0, far, jnp.inf)), jnp.inf)
+
+
+def _on_sphere(shape: Sphere, origin, direction, distance):
+    normal = scale(1 / shape.radius, ahead(minus(origin, shape.center), distance, direction))
     c, s = azimuth(normal[0], normal[1])
-    return distance, normal, (-s, c, jnp.zeros_like(c))
+    return normal, (-s, c, jnp.zeros_like(c))
 
 
-def _plane(shape: Plane, origin, direction):
+def _to_plane(shape: Plane, origin, direction):
     rate = dot(direction, shape.normal)
     distance = dot(minus(shape.point, origin), shape.normal) / jnp.where(rate == 0, 1, rate)
-    return jnp.where((rate != 0) & (distance > 0), distance, jnp.inf), shape.normal, shape.tangent
+    return jnp.where((rate != 0) & (distance > 0), distance, jnp.inf)
 
 
-def _slab(shape: Slab, origin, direction):
+def _on_plane(shape: Plane, origin, direction, distance):
+    return shape.normal, shape.tangent
+
+
+def _faces(shape: Slab, origin, direction):
+    """Per axis, the distances at which a ray enters and leaves the two planes across it."""
     enter, leave = [], []
     for low, high, o, d in zip(shape.low, shape.high, origin, direction, strict=True):
         safe = jnp.where(d == 0, 1e-20, d)
@@ -78,25 +87,55 @@ def _slab(shape: Slab, origin, direction):
         leave.append(jnp.maximum(first, second))
     near = jnp.maximum(jnp.maximum(enter[0], enter[1]), enter[2])
     far = jnp.minimum(jnp.minimum(leave[0], leave[1]), leave[2])
+    return enter, leave, near, far
+
+
+def _to_slab(shape: Slab, origin, direction):
+    *_, near, far = _faces(shape, origin, direction)
+    return jnp.where((near < far) & (far > 0), jnp.where(near > 0, near, far), jnp.inf)
+
+
+def _on_slab(shape: Slab, origin, direction, distance):
+    enter, leave, near, far = _faces(shape, origin, direction)
     outside = near > 0
-    distance = jnp.where((near < far) & (far > 0), jnp.where(outside, near, far), jnp.inf)
     across_x, across_y = (jnp.where(outside, enter[k] == near, leave[k] == far) for k in (0, 1))
     on = across_x, across_y & ~across_x, ~across_x & ~across_y
     towards = jnp.where(outside, -1, 1)
     normal = tuple(jnp.where(face, towards * jnp.sign(d), 0) for face, d in zip(on, direction, strict=True))
     one, zero = jnp.ones_like(near), jnp.zeros_like(near)
-    return distance, normal, (jnp.where(across_x, zero, one), jnp.where(across_x, one, zero), zero)
+    return normal, (jnp.where(across_x, zero, one), jnp.where(across_x, one, zero), zero)
 
 
-_MEETS = {Sphere: _sphere, Plane: _plane, Slab: _slab}
+_TO = {Sphere: _to_sphere, Plane: _to_plane, Slab: _to_slab}
+_ON = {Sphere: _on_sphere, Plane: _on_plane, Slab: _on_slab}
 
 
 def meet(shapes: Sequence[Shape], origin: AnyVector, direction: Vector) -> Hit:
     """The nearest shape along rays from `origin` along `direction`, unit."""
     zero = jnp.zeros_like(direction[0])
-    best = Hit(zero + jnp.inf, (zero, zero, zero), (zero, zero, zero), jnp.zeros(zero.shape, jnp.int32))
-    for shape in shapes:
-        distance, normal, tangent = _MEETS[type(shape)](shape, origin, direction)
-        found = Hit(distance, tuple(normal), tuple(tangent), shape.material)
-        best = select(distance < best.distance, found, best)
-    return best
+    hit = Hit(zero + jnp.inf, (zero, zero, zero), (zero, zero, zero), jnp.zeros(zero.shape, jnp.int32))
+    for kind in dict.fromkeys(map(type, shapes)):
+        distance, shape = _nearest([shape for shape in shapes if type(shape) is kind], origin, direction)
+        finite = jnp.where(jnp.isfinite(distance), distance, 0)
+        normal, tangent = _ON[kind](shape, origin, direction, finite)
+        hit = select(distance < hit.distance, Hit(distance, normal, tangent, shape.material), hit)
+    return hit
+
+
+def _nearest(shapes: Sequence[Shape], origin: AnyVector, direction: Vector) -> tuple[Array, Any]:
+    """Of shapes of one type: the distance of the nearest, and the shape itself, its fields a number a lane.
+
+    A loop: of the same written out, XLA would compute all distances again for each component of the frame.
+    """
+    every = jax.tree.map(lambda *fields: _parts(jnp.stack(fields, axis=-1)), shapes[0], *shapes[1:])
+    first = jax.tree.map(lambda field: jnp.full(direction[0].shape, field[0]), every)
+
+    def nearer(best, shape):
+        distance = _TO[type(shape)](shape, origin, direction)
+        return select(distance < best[0], (distance, shape), best), None
+
+    return lax.scan(nearer, (jnp.full_like(direction[0], jnp.inf), first), every)[0]
+
+
+def _parts(field: Array):
+    return tuple(field) if field.ndim > 1 else field
