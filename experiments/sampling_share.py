@@ -27,11 +27,14 @@ from ggxref import sampling
 from ggxref.files import write_atomically
 from ggxref.scene import image, lights, materials, render, shapes
 from ggxref.scene.materials import Kind
+from ggxref.scene.render import Picture
 
 WIDTH, HEIGHT = 72, 48
 NUMBER = still(0).astype(int)
 ALPHA = (0.2, 0.2)
 COUNTS = (1, 8, 32)
+SEEDS = {"cross_section": 1, "spherical_cap": 2}
+PICTURED = 8
 SAMPLERS = {"[Hei18]": "cross_section", "(ours)": "spherical_cap"}
 LIGHTS = (lights.Sky(still(0.2), still(0.8)), lights.Sun(still(0.48, -0.6, 0.64), still(math.radians(10)), still(10)))
 TURNS = 21
@@ -85,18 +88,25 @@ def sampler_times(kernels: dict) -> dict[str, float]:
     return {name: middle[name] - middle["nothing"] for name in SAMPLERS.values()}
 
 
-def bounce_time(surface: str, sampler: str, count: int, samples: int, kernels: dict) -> tuple[float, float]:
-    """Nanoseconds of a bounce, and those of the sampler, measured just before and after it."""
+def bounce_time(surface: str, sampler: str, count: int, samples: int, kernels: dict) -> tuple[float, float, Picture]:
+    """Nanoseconds of a bounce, and those of the sampler, measured just before and after it; the picture."""
     kind = Kind(surface, sampler=sampler, fresnel=("exact",))
     view = render.look((0.0, -4.2, 2.6), (0.0, 0.0, 0.2), math.radians(32), WIDTH, HEIGHT)
     world = render.World(view, balls(count), LIGHTS, (row(ALPHA, eta=1.5, k=0.0 if surface == "dielectric" else 4.0),))
     settings = render.Settings(WIDTH, HEIGHT)
-    render.render((kind,), world, settings, samples=2)  # compiles
+    render.prepare((kind,), world, settings)
     before = sampler_times(kernels)[sampler]
-    picture = render.render((kind,), world, settings, samples=samples, block=samples)
+    picture = render.render((kind,), world, settings, samples=samples, block=samples, seed=SEEDS[sampler])
     after = sampler_times(kernels)[sampler]
     bounces = picture.bounces * picture.samples * picture.mean.size
-    return picture.seconds / bounces * 1e9, (before + after) / 2
+    return picture.seconds / bounces * 1e9, (before + after) / 2, picture
+
+
+def agreement(old: Picture, new: Picture) -> float:
+    """Mean square of the difference of two pictures in variances: 1 if both go to the same."""
+    difference, variance = old.mean - new.mean, (old.variance + new.variance) / old.samples
+    seen = variance > 0
+    return float(np.mean(difference[seen] ** 2 / variance[seen]))
 
 
 def main() -> None:
@@ -105,10 +115,13 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("docs/figures"))
     arguments = parser.parse_args()
     kernels = drawers()
-    print("| scene | a bounce [ns] | drawing, [Hei18] [ns] | (ours) [ns] | share, [Hei18] | (ours) | speed-up |")
-    print("|---|---|---|---|---|---|---|")
-    figure = Figure(figsize=(6, 3.2), layout="constrained")
-    axes = figure.subplots()
+    print(
+        "| scene | a bounce [ns] | drawing, [Hei18] [ns] | (ours) [ns] | share, [Hei18] | (ours) | speed-up | agreement |"
+    )
+    print("|---|---|---|---|---|---|---|---|")
+    figure = Figure(figsize=(9, 3.4), layout="constrained")
+    panels = figure.subplot_mosaic([["shares", "conductor"], ["shares", "dielectric"]], width_ratios=[1.7, 1])
+    axes = panels["shares"]
     for surface, mark in (("conductor", "o"), ("dielectric", "s")):
         shares = {name: [] for name in SAMPLERS}
         for count in COUNTS:
@@ -116,13 +129,18 @@ def main() -> None:
                 name: bounce_time(surface, sampler, count, arguments.samples, kernels)
                 for name, sampler in SAMPLERS.items()
             }
-            for name, (bounce, drawing) in found.items():
+            for name, (bounce, drawing, _) in found.items():
                 shares[name].append(drawing / bounce)
-            (old_bounce, old), (new_bounce, new) = found.values()
+            (old_bounce, old, before), (new_bounce, new, after) = found.values()
             cells = f"{(old_bounce + new_bounce) / 2:.0f}", f"{old:.1f}", f"{new:.1f}"
             ratio = (old / old_bounce) / (new / new_bounce)
             shown = *cells, f"{old / old_bounce:.2%}", f"{new / new_bounce:.2%}", f"×{ratio:.2f}"
+            shown += (f"{agreement(before, after):.2f}",)
             print(f"| {count} of {surface} | " + " | ".join(shown) + " |", flush=True)
+            if count == PICTURED:
+                panels[surface].imshow(image.to_bytes(after.mean), cmap="gray", vmin=0, vmax=255)
+                panels[surface].set_title(f"{count} of {surface}, (ours)", fontsize=8)
+                panels[surface].set_axis_off()
         for (name, values), color in zip(shares.items(), ("0.5", "tab:blue"), strict=True):
             axes.plot(COUNTS, 100 * np.array(values), f"{mark}-", color=color, label=f"{surface}, {name}")
     axes.set(xscale="log", xlabel="balls", ylabel="time in drawing normals [%]", ylim=(0, None))

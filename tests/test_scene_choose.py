@@ -108,6 +108,26 @@ def test_what_costs_more_is_not_taken(search, monkeypatch):
         assert settle(search[0](0.05))[0]["plain"].g2 == expected
 
 
+@pytest.mark.parametrize(("ns", "named"), [(130.0, 0), (70.0, 1)])
+def test_what_is_slower_as_a_whole_is_not_named(search, monkeypatch, ns, named):
+    """Formulas that are cheaper by themselves may be dearer in a picture: then the richest is named, by a factor of 1."""
+    every = search[0](0.05)
+    plainer = {
+        name: choose.with_option(every.named[name], each, "g2", "separable") for name, each in every.richest.items()
+    }
+    candidates = [every.richest, plainer]
+
+    def whole(choices, samples, seed=0):
+        return Batches(np.zeros((8, 6, 8)), np.ones((6, 8)), ns + seed % 2 if choices == plainer else 100.0 + seed % 2)
+
+    monkeypatch.setattr(every, "whole", whole)
+    best, pictures, faster, error = choose._fastest(every, candidates)
+    assert best == candidates[named]
+    assert faster == pytest.approx([1.0, 100 / 70][named], rel=0.02)
+    assert error < 0.02
+    assert pictures["chosen"].ns_per_sample == (100.0, ns)[named]
+
+
 def test_rounds_of_the_search_are_counted(search):
     """Nine options, two materials to find a sampler for, and the richest, the chosen together, the timing."""
     assert choose.stages(search[0](0.1).scene) == 9 + 2 + 3

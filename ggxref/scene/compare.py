@@ -82,7 +82,7 @@ class Batches:
 def batches(kinds, world, settings: render.Settings, *, count: int, samples: int, seed: int) -> Batches:
     """`count` pictures of `samples` samples a pixel: one seed gives two models the same numbers."""
     settings = replace(settings, batches=count)
-    render.render(kinds, world, settings, samples=1, seed=seed)  # compiles
+    render.prepare(kinds, world, settings)
     found = render.render(kinds, world, settings, samples=samples, seed=seed)
     return Batches(found.mean, found.variance.mean(axis=0), found.seconds / (samples * settings.slots) * 1e9)
 

@@ -49,7 +49,8 @@ def steps_up(result: Result) -> list[Up]:
 def wasted(result: Result) -> dict[str, float]:
     """Per material, the share of the richest's time at equal noise that the chosen formulas do not need."""
     needed = {each.material: each.effort for each in result.samplers if _is_chosen(result, each)}
-    return {name: 1 - effort / result.costs[name] for name, effort in needed.items()}
+    same = {name for name, choice in result.chosen.items() if choice == result.richest[name]}
+    return {name: 0.0 if name in same else 1 - effort / result.costs[name] for name, effort in needed.items()}
 
 
 def _is_chosen(result: Result, each: Sampler) -> bool:
@@ -144,7 +145,7 @@ def _verdict(result: Result) -> str:
     waste = f"{100 * share:.0f} % is wasted today" if share > 0 else "nothing is wasted today"
     return (
         f"Whole picture: {ns['richest']:.0f} ns a sample with the richest, {ns['chosen']:.0f} with the chosen; "
-        f"{result.faster:.2f} times as fast at equal noise: {waste}."
+        f"{result.faster:.2f} ± {result.faster_error:.2f} times as fast at equal noise: {waste}."
     )
 
 
@@ -174,6 +175,7 @@ def document(result: Result) -> dict:
         "samplers": [vars(each) for each in result.samplers],
         "ns_per_sample": {name: each.ns_per_sample for name, each in result.pictures.items()},
         "faster": result.faster,
+        "faster_standard_error": result.faster_error,
         "wasted": 1 - 1 / result.faster,
     }
 
