@@ -138,7 +138,7 @@ def main() -> None:
             shown += (f"{agreement(before, after):.2f}",)
             print(f"| {count} of {surface} | " + " | ".join(shown) + " |", flush=True)
             if count == PICTURED:
-                panels[surface].imshow(image.to_bytes(after.mean), cmap="gray", vmin=0, vmax=255)
+                panels[surface].imshow(image.to_bytes(after.mean), cmap="gray", vmin=0, vmax=255, aspect="auto")
                 panels[surface].set_title(f"{count} of {surface}, (ours)", fontsize=8)
                 panels[surface].set_axis_off()
         for (name, values), color in zip(shares.items(), ("0.5", "tab:blue"), strict=True):

@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from typer.core import TyperGroup
 
 from ggxref.errors import InputError
-from ggxref.files import writable, write_atomically
+from ggxref.files import writable, writable_directory, write_atomically
 
 
 class _Verbs(TyperGroup):
@@ -294,8 +294,7 @@ def choose(
 
     writable("--json", json)
     writable("--figure", figure)
-    if pictures and not pictures.parent.is_dir():
-        raise InputError(f"--pictures: {pictures} cannot be written: there is no directory {pictures.parent}")
+    writable_directory("--pictures", pictures)
     console = Console()
     asked = read(scene)
     with _stages(search.stages(asked)) as say:

@@ -14,6 +14,13 @@ def writable(option: str, path: Path | None) -> None:
         raise InputError(f"{option}: {path} cannot be written: {why}")
 
 
+def writable_directory(option: str, path: Path | None) -> None:
+    """That `path` is a directory, or that one can be made there; to be asked before the work whose result it takes."""
+    if path and not path.is_dir() and (path.exists() or not path.parent.is_dir()):
+        why = "it is a file" if path.exists() else f"there is no directory {path.parent}"
+        raise InputError(f"{option}: {path} cannot be written: {why}")
+
+
 def write_atomically(path: Path | str, data: bytes | str) -> None:
     """Write `data` (text as UTF-8) under a temporary name beside `path`, then rename it over `path`."""
     path = Path(path)

@@ -5,6 +5,7 @@ import os
 import pytest
 
 from ggxref import files
+from ggxref.errors import InputError
 
 
 def test_it_replaces_a_file_and_leaves_no_other(tmp_path):
@@ -33,3 +34,12 @@ def test_an_interrupted_write_keeps_the_old_file_and_removes_the_new(tmp_path, m
         files.write_atomically(path, "new")
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_directory_that_cannot_be_is_refused_before_the_work(tmp_path):
+    (tmp_path / "file").write_text("")
+    for path in (tmp_path / "file", tmp_path / "none" / "here"):
+        with pytest.raises(InputError, match=f"--out: {path} cannot be written"):
+            files.writable_directory("--out", path)
+    for path in (None, tmp_path, tmp_path / "new"):
+        files.writable_directory("--out", path)

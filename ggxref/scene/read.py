@@ -310,22 +310,32 @@ def read(path: Path) -> Scene:
         raise InputError(f"{path}: cannot be read as TOML: {error}") from None
     root = Table(path, "", values)
     title = root.take("title", text(), path.stem)
-    budget = root.table("budget")
+    budget, view, materials = (root.table(key) for key in ("budget", "view", "materials"))
+    shapes, lights = _list(root, "shapes"), _list(root, "lights")
+    root.close()  # before what is in them: a [veiw] is better named than the origin that [view] lacks
     if budget.has("samples") and budget.has("seconds"):
         raise budget.bad("seconds", "with samples beside it; need one of the two")
     seconds = budget.take("seconds", number(0, 1e5, above=True), 0.0)
     samples = budget.take("samples", whole(2, 1 << 20), 256)
     budget.close()
-    width, height, view = _view(root.table("view"))
+    width, height, seen = _view(view)
     if samples * width * height > MOST:
         what = f"{samples} samples of {width} x {height} pixels"
         raise InputError(f"{path}: budget.samples: {what}; at most {MOST} samples can be numbered")
-    table = root.table("materials")
-    materials = tuple(_material(name, table.table(name)) for name in table.values)
-    if not materials:
+    made = tuple(_material(name, materials.table(name)) for name in materials.values)
+    if not made:
         raise InputError(f"{path}: no [materials.NAME]; shapes need one")
-    names = tuple(material.name for material in materials)
-    shapes = tuple(_record(each, _SHAPES, names) for each in _list(root, "shapes"))
-    lights = tuple(_record(each, _LIGHTS) for each in _list(root, "lights"))
-    root.close()
-    return Scene(path, title, width, height, samples, seconds, view, shapes, lights, materials)
+    names = tuple(material.name for material in made)
+    things = tuple(_record(each, _SHAPES, names) for each in shapes)
+    return Scene(
+        path,
+        title,
+        width,
+        height,
+        samples,
+        seconds,
+        seen,
+        things,
+        tuple(_record(each, _LIGHTS) for each in lights),
+        made,
+    )

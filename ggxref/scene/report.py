@@ -200,17 +200,20 @@ def figure(result: Result) -> bytes:
     plot = Figure(figsize=(max(9, 2.6 * len(names)), 6), layout="constrained")
     above, below = plot.subfigures(2, 1, squeeze=False, height_ratios=[1.25, 1])[:, 0]
     panels = above.subplots(1, len(names), sharex=True, sharey=True, squeeze=False)[0]
-    for panel, name in zip(panels, names, strict=True):
-        _speed_against_error(panel, result, name)
+    labels = [_speed_against_error(panel, result, name) for panel, name in zip(panels, names, strict=True)]
     panels[0].set_ylabel("formulas, times the richest's time", fontsize=8)
     handles = [Line2D([], [], marker=mark, ls="", color="0.3", ms=4, label=axis) for axis, mark in _MARKS.items()]
     above.legend(handles=handles, loc="outside upper center", ncols=len(handles), fontsize=7, frameon=False)
     above.supxlabel("deviation from the richest [%]; red line: the tolerance; filled: chosen", fontsize=8)
     _side_by_side(below, result)
+    plot.draw_without_rendering()  # lays the panels out: where a label fits hangs on their size
+    for panel, named in zip(panels, labels, strict=True):
+        _label(panel, named)
     return image.figure_bytes(plot, dpi=130)
 
 
-def _speed_against_error(panel: Axes, result: Result, name: str) -> None:
+def _speed_against_error(panel: Axes, result: Result, name: str) -> dict[tuple[float, float], list[str]]:
+    """Draws a material's panel; the options at each of its points."""
     labels: dict[tuple[float, float], list[str]] = {}
     for step in (s for s in result.steps if s.material == name and math.isfinite(s.deviation.value)):
         x, y = max(100 * step.deviation.value, 1e-3), step.ns / result.costs[name]
@@ -218,8 +221,6 @@ def _speed_against_error(panel: Axes, result: Result, name: str) -> None:
         color, face, order = ("tab:blue", "tab:blue", 3) if chosen else ("0.3", "white", 2)
         panel.plot(x, y, _MARKS[step.axis], ms=5, color=color, mfc=face, zorder=order)
         labels.setdefault((x, y), []).append(step.option)
-    for at, options in labels.items():
-        panel.annotate(", ".join(options), at, fontsize=6, xytext=(4, 3), textcoords="offset points")
     panel.axhline(1, color="0.7", lw=0.8, zorder=0)
     if result.tolerance > 0:
         panel.axvline(100 * result.tolerance, color="tab:red", lw=1, zorder=0)
@@ -229,6 +230,41 @@ def _speed_against_error(panel: Axes, result: Result, name: str) -> None:
     panel.tick_params(labelsize=7, which="both")
     panel.yaxis.set_major_formatter("{x:g}")
     panel.yaxis.set_minor_formatter("{x:g}")
+    return labels
+
+
+_SIZE = 6.0
+"""Of a label's letters, in points; one is 0.55 of it wide on average, as measured on these words."""
+
+
+def _label(panel: Axes, labels: dict[tuple[float, float], list[str]]) -> None:
+    """Each point's options beside it, where the panel, the marks and the labels before leave room."""
+    points = 72 / panel.get_figure(root=True).dpi  # pyright: ignore[reportOptionalMemberAccess]
+    inside = np.array(panel.bbox.extents) * points
+    at = {key: panel.transData.transform(key) * points for key in labels}
+    taken = [np.array([x - 3, y - 3, x + 3, y + 3]) for x, y in at.values()]
+    for key in sorted(labels, key=lambda key: -at[key][1]):
+        text, (x, y) = ", ".join(labels[key]), at[key]
+        width = 0.55 * _SIZE * len(text)
+        places = [(side, dy) for dy in sorted(range(-70, 71), key=abs) for side in (1, -1)]
+        for side, dy in places:
+            left = x + 5 if side > 0 else x - 5 - width
+            place = np.array([left, y + dy - _SIZE / 2, left + width, y + dy + _SIZE / 2])
+            free = not any(_overlap(place, other) for other in taken)
+            if free and (place[:2] >= inside[:2]).all() and (place[2:] <= inside[2:]).all():
+                taken.append(place)
+                break
+        else:
+            side, dy = 1, 0
+        line = {"arrowstyle": "-", "lw": 0.4, "color": "0.6", "shrinkA": 0, "shrinkB": 2} if abs(dy) > _SIZE else None
+        ha = "left" if side > 0 else "right"
+        offset = {"xytext": (5 * side, dy), "textcoords": "offset points"}
+        ground = {"fc": "white", "ec": "none", "pad": 0.5, "alpha": 0.8}
+        panel.annotate(text, key, **offset, fontsize=_SIZE, arrowprops=line, ha=ha, va="center", bbox=ground)
+
+
+def _overlap(a: np.ndarray, b: np.ndarray) -> bool:
+    return bool((a[:2] < b[2:]).all() and (b[:2] < a[2:]).all())
 
 
 def _side_by_side(part: SubFigure, result: Result) -> None:
