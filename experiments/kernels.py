@@ -8,31 +8,21 @@ machine; the extra `peers` for Mitsuba's columns.
 """
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
-from ggxref import bsdf, fresnel, geometry, masking, ndf, stable
+from ggxref import masking, ndf
 from ggxref.files import write_atomically
-from ggxref.measure import peers, speed, tables
+from ggxref.measure import peers, speed
 from ggxref.measure.accuracy import measure
 from ggxref.measure.reference import REFERENCES
 from ggxref.measure.regions import REGIONS
+from ggxref.measure.variants import QUANTITIES
 from ggxref.sampling import bounded_cap, cross_section, spherical_cap
 
 MARKS = "<!-- kernels: experiments/kernels.py -->\n", "<!-- end kernels -->\n"
 SIZES = (1 << 16, 1 << 18, 1 << 20)
 POINTS = 1 << 15
-
-
-def conductor(wi, wo, alpha):
-    """D G2 F / (4 z_i z_o) of a metal."""
-    wm = geometry.half_reflection(wi, wo)
-    g2 = masking.g2_height_correlated(masking.g1_ggx(wi, wm, alpha), masking.g1_ggx(wo, wm, alpha))
-    F = fresnel.conductor(stable.cosine(wi, wm), 0.2, 3.9)
-    return bsdf.brdf(wi, wo, ndf.ggx(wm, alpha), g2, F)
-
-
-def half(wi, wo, alpha):
-    return geometry.half_reflection(wi, wo)
 
 
 # Kernel, Mitsuba's of the same, the name of its reference; all of a group take the same arguments.
@@ -45,10 +35,8 @@ GROUPS = (
     {"spherical_cap.pdf": (spherical_cap.pdf, "mitsuba pdf", "sampling.spherical_cap.pdf")},
     {"ndf.ggx": (ndf.ggx, "mitsuba eval", "ndf.ggx")},
     {"masking.g1_ggx": (masking.g1_ggx, "", "masking.g1_ggx")},
-    {
-        "half_reflection": (half, "", "geometry.half_reflection"),
-        "conductor: D G2 F / 4 z z": (conductor, "mitsuba conductor", ""),
-    },
+    {f"conductor, {v.name}": (v.function, "mitsuba conductor", "brdf") for v in QUANTITIES["brdf"].variants},
+    {f"half vector, {v.name}": (v.function, "", "half") for v in QUANTITIES["half"].variants},
 )
 
 
@@ -66,9 +54,9 @@ def times(group: dict) -> dict[str, list[tuple[speed.Timing, float | None, float
     return found
 
 
-def error(name: str) -> str:
-    """p99.9 and the largest error of the library's function of that name, over all regions."""
-    f, reference = tables.library(name), REFERENCES[name]
+def error(f: Callable, name: str) -> str:
+    """p99.9 and the largest error of a kernel over all regions; its reference is a public function's or a quantity's."""
+    reference = REFERENCES[name] if name in REFERENCES else QUANTITIES[name].reference
     graded = [measure(name, "", f, reference, region=region, count=POINTS, rounds=4) for region in REGIONS]
     unit = "ulp" if graded[0].unit == "ulp" else "× 2⁻²⁴"
     return f"{max(a.p999 for a in graded):.2g} {unit} | {max(a.worst for a in graded):.2g} {unit}"
@@ -84,8 +72,7 @@ def table() -> str:
     for group in GROUPS:
         for name, sizes in times(group).items():
             cells = [f"{t.median:.1f} [{t.lower:.1f}]" + (f", {ratio:.2f} ×" if ratio else "") for t, ratio, _ in sizes]
-            reference = group[name][2]
-            graded = error(reference) if reference else "|"
+            graded = error(group[name][0], group[name][2])
             lines.append(f"| {name} | {' | '.join(cells)} | {sizes[-1][2]:.1f} × | {graded} |")
             print(lines[-1], flush=True)
     return "\n".join(lines) + "\n"

@@ -1,9 +1,12 @@
 """D, G and F put together: BRDF, BTDF [1/sr] and the weights of the samplers, from their values."""
 
+import math
+
 import jax.numpy as jnp
 
 from ggxref import geometry, jacobian, stable
-from ggxref._types import Real, Scalar, Vec3
+from ggxref._types import Real, Scalar, Vec2, Vec3
+from ggxref.ellipsoid import length
 
 
 def _over(numerator, denominator):
@@ -20,6 +23,27 @@ def brdf(wi: Vec3, wo: Vec3, D: Real, G2: Real, F: Real) -> Scalar:
     heitz2014 §2.1 (which prints D(ω_ht)); walter2014 (4); dupuy2023 (11).
     """
     return _over(D * G2 * F, 4 * jnp.abs(wi[2]) * jnp.abs(wo[2]))
+
+
+@stable.widened
+def brdf_ggx(wi: Vec3, wo: Vec3, alpha: Vec2) -> Scalar:
+    r"""$f_r$ of GGX with height-correlated masking, but for F [1/sr]: `brdf` of its D and G2, in one expression of
+    $h = \omega_i + \omega_o$, $\frac{1}{2\pi\alpha_x\alpha_y q^2 (z_o\|A\omega_i\| + z_i\|A\omega_o\|)}$ with
+    $q = (h_x^2/\alpha_x^2 + h_y^2/\alpha_y^2 + h_z^2)/\|h\|^2$, $A = \mathrm{diag}(\alpha_x, \alpha_y, 1)$.
+
+    - `wi`, `wo`: unit, (3,); 0 unless both are above the horizon. `alpha`: positive, (2,).
+    - F's cosine, $\omega_i\cdot\omega_h$, is $\|h\|/2$.
+
+    tokuyoshi2024's D and dupuy2023 (13) in walter2014 (4): the heights of G2 and of the denominator cancel, h is never
+    normalised, and no digit is lost where $\omega_o$ is nearly $-\omega_i$. A third of the composition's time.
+    """
+    x, y, z = stable.unit_sum(wi, wo)
+    seen = (wi[2] > 0) & (wo[2] > 0)
+    square = jnp.where(seen, x * x + y * y + z * z, 1)
+    q = jnp.where(seen, ((x / alpha[0]) ** 2 + (y / alpha[1]) ** 2 + z * z) / square, 1)
+    length_i, length_o = (length(alpha[0] * w[0], alpha[1] * w[1], w[2]) for w in (wi, wo))
+    between = jnp.where(seen, wo[2] * length_i + wi[2] * length_o, 1)
+    return jnp.where(seen, 1 / (2 * math.pi * (alpha[0] * q) * (alpha[1] * q) * between), 0)
 
 
 def btdf(wi: Vec3, wo: Vec3, n_i: Real, n_o: Real, D: Real, G2: Real, F: Real) -> Scalar:

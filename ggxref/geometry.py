@@ -54,7 +54,7 @@ def half_refraction(wi: Vec3, wo: Vec3, n_i: Real, n_o: Real) -> Vec3:
 
     Walter et al. 2007 (16), used by heitz2014 §2.1.
     """
-    wm = stable.direction(*stable.unit_sum(wi, wo, n_i, n_o))
+    wm = stable.direction(*stable.weighted_sum(wi, wo, n_i, n_o))
     return jnp.stack([jnp.where(wm[2] < 0, -x, x) for x in wm])
 
 

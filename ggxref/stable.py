@@ -145,11 +145,19 @@ def _excess_jvp(primals, tangents):
 
 
 @widened
-def unit_sum(a: Vec3, b: Vec3, n_a: Real = 1.0, n_b: Real = 1.0) -> tuple[Scalar, Scalar, Scalar]:
-    """`n_a a + n_b b` for exactly unit directions: where they nearly cancel, what rounding added to the lengths is as large.
+def unit_sum(a: Vec3, b: Vec3) -> tuple[Scalar, Scalar, Scalar]:
+    """`a + b` for exactly unit directions: where they nearly cancel, what rounding added to the lengths is as large.
 
-    A component at a time: arrays of three are neither inlined nor vectorised by XLA, and cost eight times as much.
+    The sum itself is then exact. A component at a time: arrays of three are neither inlined nor vectorised by XLA.
     """
+    longer_a, longer_b = excess(a), excess(b)
+    x, y, z = (p + q - (p * longer_a + q * longer_b) for p, q in zip(a, b, strict=True))
+    return x, y, z
+
+
+@widened
+def weighted_sum(a: Vec3, b: Vec3, n_a: Real, n_b: Real) -> tuple[Scalar, Scalar, Scalar]:
+    """`n_a a + n_b b` for exactly unit directions, as `unit_sum`; here the products are rounded, and cancel."""
     n_a, n_b = jnp.asarray(n_a, a.dtype), jnp.asarray(n_b, a.dtype)
     longer_a, longer_b = n_a * excess(a), n_b * excess(b)
 

@@ -22,7 +22,7 @@ NAMES = {
     "g1_v_cavity(w, wm) g1_ellipsoid(w, wm, A) g2_separable(g1_i, g1_o) g2_height_correlated(g1_i, g1_o) "
     "g2_v_cavity(wi, wo, wm)",
     "fresnel": "dielectric(cos_i, eta) conductor(cos_i, eta, k) schlick(cos_i, f0)",
-    "bsdf": "brdf(wi, wo, D, G2, F) btdf(wi, wo, n_i, n_o, D, G2, F) weight_normals(wi, wm, G2) weight_visible(g1_i, g2, F)",
+    "bsdf": "brdf(wi, wo, D, G2, F) brdf_ggx(wi, wo, alpha) btdf(wi, wo, n_i, n_o, D, G2, F) weight_normals(wi, wm, G2) weight_visible(g1_i, g2, F)",
     "sampling.normals": "sample_ggx(u, alpha) sample_beckmann(u, alpha) pdf_ggx(wm, alpha) pdf_beckmann(wm, alpha)",
     "sampling.slope_ggx": "sample(u, wi, alpha) pdf(wm, wi, alpha)",
     "sampling.slope_beckmann": "sample(u, wi, alpha) pdf(wm, wi, alpha)",

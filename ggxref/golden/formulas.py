@@ -194,6 +194,13 @@ FRESNEL = [
 BSDF = [
     entry("bsdf.brdf(wi, wo, D, G2, F)", 6, r"DG_2F / (4|\omega_i\cdot n||\omega_o\cdot n|)", "walter2014 (4)"),
     entry(
+        "bsdf.brdf_ggx(wi, wo, alpha)",
+        30,
+        r"DG_2 / (4|\omega_i\cdot n||\omega_o\cdot n|) of GGX with height-correlated masking at \omega_h; "
+        r"0 unless both are above the horizon",
+        "walter2014 (4); dupuy2023 (13)",
+    ),
+    entry(
         "bsdf.btdf(wi, wo, n_i, n_o, D, G2, F)",
         32,
         r"|\omega_i\cdot\omega_h||\omega_o\cdot\omega_h| n_o^2(1-F)G_2D / "

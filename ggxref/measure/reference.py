@@ -46,7 +46,7 @@ def _plus(a, b):
     return tuple(x + y for x, y in zip(a, b, strict=True))
 
 
-def _unit(a):
+def unit(a):
     n = _norm(a)
     n = where(n.hi > 0, n, 1.0)
     return tuple(x / n for x in a)
@@ -83,7 +83,7 @@ def _over(a, b):
 
 @_stands_for("ndf.ggx")
 def ndf_ggx(wm, alpha):
-    x, y, z = _unit(wm)
+    x, y, z = unit(wm)
     q = (x / alpha[0]) * (x / alpha[0]) + (y / alpha[1]) * (y / alpha[1]) + z * z
     return where(z.hi > 0, 1.0 / (PI * alpha[0] * alpha[1] * q * q), 0.0)
 
@@ -97,7 +97,7 @@ def _tangent_square(wm, alpha):
 
 @_stands_for("ndf.beckmann")
 def ndf_beckmann(wm, alpha):
-    z = _unit(wm)[2]
+    z = unit(wm)[2]
     above = z.hi > 0
     square = where(above, z, 1.0) * where(above, z, 1.0)
     exponent = maximum(-_tangent_square(wm, alpha), -700.0)
@@ -107,7 +107,7 @@ def ndf_beckmann(wm, alpha):
 
 @_stands_for("ndf.student_t")
 def ndf_student_t(wm, alpha, gamma):
-    z = _unit(wm)[2]
+    z = unit(wm)[2]
     above = z.hi > 0
     square = where(above, z, 1.0) * where(above, z, 1.0)
     g = gamma - 1.0
@@ -117,7 +117,7 @@ def ndf_student_t(wm, alpha, gamma):
 
 @_stands_for("ndf.ellipsoid")
 def ndf_ellipsoid(wm, A):
-    wm = _unit(wm)
+    wm = unit(wm)
     det = _det(A)
     stretched = _scaled(1.0 / det, _apply(_cofactor(A), wm))
     square = _dot(stretched, stretched)
@@ -148,7 +148,7 @@ def _front(w, wm):
 
 @_stands_for("masking.lambda_ggx")
 def masking_lambda_ggx(w, alpha):
-    w = _unit(w)
+    w = unit(w)
     square = _flat(w, alpha)
     z = abs(w[2])
     return square / (2.0 * z * (z + sqrt(square + z * z)))
@@ -164,25 +164,25 @@ def _gaussian_area(w, alpha):
 
 @_stands_for("masking.lambda_beckmann")
 def masking_lambda_beckmann(w, alpha):
-    w = _unit(w)
+    w = unit(w)
     return _gaussian_area(w, alpha) / abs(w[2])
 
 
 @_stands_for("masking.g1_ggx")
 def masking_g1_ggx(w, wm, alpha):
-    up = _up(_unit(w))
+    up = _up(unit(w))
     return where(_front(w, wm), up[2] / _sigma_ggx(up, alpha), 0.0)
 
 
 @_stands_for("masking.g1_beckmann")
 def masking_g1_beckmann(w, wm, alpha):
-    up = _up(_unit(w))
+    up = _up(unit(w))
     return where(_front(w, wm), _over(up[2], up[2] + _gaussian_area(up, alpha)), 0.0)
 
 
 @_stands_for("masking.g1_v_cavity")
 def masking_g1_v_cavity(w, wm):
-    w, wm = _unit(w), _unit(wm)
+    w, wm = unit(w), unit(wm)
     return where(_front(w, wm), minimum(_over(2.0 * abs(wm[2] * w[2]), abs(_dot(w, wm))), 1.0), 0.0)
 
 
@@ -198,7 +198,7 @@ def _sigma_ellipsoid(w, A):
 
 @_stands_for("masking.g1_ellipsoid")
 def masking_g1_ellipsoid(w, wm, A):
-    up = _up(_unit(w))
+    up = _up(unit(w))
     return where(_front(w, wm), minimum(_over(up[2], _sigma_ellipsoid(up, A)), 1.0), 0.0)
 
 
@@ -238,17 +238,31 @@ def fresnel_dielectric(cos_i, eta):
     return where(gap == 0, 0.0, where((square.hi <= 0) & (gap < 0), 1.0, value))
 
 
+@_stands_for("fresnel.conductor")
+def fresnel_conductor(cos_i, eta, k):
+    c = abs(cos_i)
+    cc, ss = c * c, (1.0 - c) * (1.0 + c)
+    real = eta * eta - k * k - ss
+    modulus = sqrt(real * real + 4.0 * (eta * k) * (eta * k))
+    # (a + ib)² = real + 2iηk; the smaller of a and b from their product.
+    large = sqrt((modulus + abs(real)) * 0.5)
+    a = where(real.hi >= 0, large, eta * k / large)
+    s = _over(modulus + cc - 2.0 * a * c, modulus + cc + 2.0 * a * c)
+    mixed, straight = 2.0 * a * c * ss, modulus * cc + ss * ss
+    return s * (1.0 + _over(straight - mixed, straight + mixed)) * 0.5
+
+
 # jacobians, directions, areas
 
 
 @_stands_for("jacobian.reflection")
 def jacobian_reflection(wo, wm):
-    return 1.0 / (4.0 * abs(_dot(_unit(wo), _unit(wm))))
+    return 1.0 / (4.0 * abs(_dot(unit(wo), unit(wm))))
 
 
 @_stands_for("jacobian.refraction")
 def jacobian_refraction(wi, wo, wm, n_i, n_o):
-    wi, wo, wm = _unit(wi), _unit(wo), _unit(wm)
+    wi, wo, wm = unit(wi), unit(wo), unit(wm)
     o = _dot(wo, wm)
     total = n_i * _dot(wi, wm) + n_o * o
     return n_o * n_o * abs(o) / (total * total)
@@ -256,24 +270,24 @@ def jacobian_refraction(wi, wo, wm, n_i, n_o):
 
 @_stands_for("jacobian.slope")
 def jacobian_slope(wm):
-    z = _unit(wm)[2]
+    z = unit(wm)[2]
     return 1.0 / (z * z * z)
 
 
 @_stands_for("jacobian.linear")
 def jacobian_linear(wm, M):
-    stretched = _norm(_apply(M, _unit(wm)))
+    stretched = _norm(_apply(M, unit(wm)))
     return abs(_det(M)) / (stretched * stretched * stretched)
 
 
 @_stands_for("ellipsoid.projected_area")
 def ellipsoid_projected_area(w, A, size):
-    return PI * size * size * _norm(_apply(A, _unit(w))) / abs(_det(A))
+    return PI * size * size * _norm(_apply(A, unit(w))) / abs(_det(A))
 
 
 @_stands_for("ellipsoid.lune_area")
 def ellipsoid_lune_area(u, v, A, size):
-    u, v = _apply(A, _unit(u)), _apply(A, _unit(v))
+    u, v = _apply(A, unit(u)), _apply(A, unit(v))
     product, cosine = _norm(u) * _norm(v), _dot(u, v)
     cross = _cross(u, v)
     below = cosine.hi < 0
@@ -283,36 +297,36 @@ def ellipsoid_lune_area(u, v, A, size):
 
 @_stands_for("geometry.reflect")
 def geometry_reflect(w, wm):
-    w, wm = _unit(w), _unit(wm)
+    w, wm = unit(w), unit(wm)
     return _plus(_scaled(2.0 * _dot(w, wm), wm), _scaled(-1.0, w))
 
 
 @_stands_for("geometry.half_reflection")
 def geometry_half_reflection(wi, wo):
-    return _unit(_plus(_unit(wi), _unit(wo)))
+    return unit(_plus(unit(wi), unit(wo)))
 
 
 # densities
 
 
 def _visible(wm, wi, D, sigma):
-    cosine = _dot(_unit(wi), _unit(wm))
+    cosine = _dot(unit(wi), unit(wm))
     return where(cosine.hi > 0, _over(cosine * D, sigma), 0.0)
 
 
 @_stands_for("sampling.spherical_cap.pdf")
 def sampling_spherical_cap_pdf(wm, wi, alpha):
-    return _visible(wm, wi, ndf_ggx(wm, alpha), _sigma_ggx(_unit(wi), alpha))
+    return _visible(wm, wi, ndf_ggx(wm, alpha), _sigma_ggx(unit(wi), alpha))
 
 
 @_stands_for("sampling.ellipsoid_cap.pdf")
 def sampling_ellipsoid_cap_pdf(wm, wi, A):
-    return _visible(wm, wi, ndf_ellipsoid(wm, A), _sigma_ellipsoid(_unit(wi), A))
+    return _visible(wm, wi, ndf_ellipsoid(wm, A), _sigma_ellipsoid(unit(wi), A))
 
 
 @_stands_for("sampling.normals.pdf_ggx")
 def sampling_normals_pdf_ggx(wm, alpha):
-    return ndf_ggx(wm, alpha) * _unit(wm)[2]
+    return ndf_ggx(wm, alpha) * unit(wm)[2]
 
 
 def _bound_terms(wi, alpha):
@@ -326,14 +340,14 @@ def _bound_terms(wi, alpha):
 
 @_stands_for("sampling.bounded_cap.bound")
 def sampling_bounded_cap_bound(wi, alpha):
-    return _bound_terms(_unit(wi), alpha)[0]
+    return _bound_terms(unit(wi), alpha)[0]
 
 
 # samplers
 
 
 def _sphere(wi, alpha):
-    x, y, z = _unit(wi)
+    x, y, z = unit(wi)
     return alpha[0] * x, alpha[1] * y, z
 
 
@@ -354,20 +368,20 @@ def _half_in_cap(u, i, cut):
 @_stands_for("sampling.spherical_cap.sample")
 def sampling_spherical_cap_sample(u, wi, alpha):
     x, y, z = _half_in_cap(u, _sphere(wi, alpha), 0.0)
-    return _unit((alpha[0] * x, alpha[1] * y, z))
+    return unit((alpha[0] * x, alpha[1] * y, z))
 
 
 @_stands_for("sampling.bounded_cap.sample")
 def sampling_bounded_cap_sample(u, wi, alpha):
     i = _sphere(wi, alpha)
-    x, y, z = _half_in_cap(u, i, _bound_terms(_unit(wi), alpha)[1] * i[2])
-    return _unit((alpha[0] * x, alpha[1] * y, z))
+    x, y, z = _half_in_cap(u, i, _bound_terms(unit(wi), alpha)[1] * i[2])
+    return unit((alpha[0] * x, alpha[1] * y, z))
 
 
 @_stands_for("sampling.cross_section.sample")
 def sampling_cross_section_sample(u, wi, alpha):
     """dupuy2023 listing 2, in the frame of the stretched ω_i; double-double carries its cancellations."""
-    i = _unit(_sphere(wi, alpha))
+    i = unit(_sphere(wi, alpha))
     flat = sqrt(i[0] * i[0] + i[1] * i[1])
     pole = flat.hi == 0
     safe = where(pole, 1.0, flat)
@@ -380,14 +394,14 @@ def sampling_cross_section_sample(u, wi, alpha):
     t2 = (1.0 - blend) * sqrt(1.0 - t1 * t1) + blend * t2
     t3 = sqrt(1.0 - t1 * t1 - t2 * t2)
     x, y, z = _plus(_plus(_scaled(t1, w1), _scaled(t2, w2)), _scaled(t3, i))
-    return _unit((alpha[0] * x, alpha[1] * y, _positive(z)))
+    return unit((alpha[0] * x, alpha[1] * y, _positive(z)))
 
 
 @_stands_for("sampling.normals.sample_ggx")
 def sampling_normals_sample_ggx(u, alpha):
     c, s = cos_sin_turn(u[0])
     r = sqrt(u[1])
-    return _unit((alpha[0] * r * c, alpha[1] * r * s, sqrt(1.0 - u[1])))
+    return unit((alpha[0] * r * c, alpha[1] * r * s, sqrt(1.0 - u[1])))
 
 
 @_stands_for("sampling.ellipsoid_cap.sample")
@@ -399,7 +413,7 @@ def sampling_ellipsoid_cap_sample(u, wi, A):
     c00 = sqrt(_dot(rows[0], rows[0]) / n - ex * ex)
     c10 = (_dot(rows[0], rows[1]) / n - ex * ey) / c00
     c11 = abs(_det(A)) / (n * sqrt(n) * c00)
-    x, y, z = _unit(wi)
+    x, y, z = unit(wi)
     i = c00 * x + c10 * y, c11 * y, ex * x + ey * y + z
     x, y, z = _half_in_cap(u, i, 0.0)
-    return _unit((c00 * x + ex * z, c10 * x + c11 * y + ey * z, z))
+    return unit((c00 * x + ex * z, c10 * x + c11 * y + ey * z, z))

@@ -2,8 +2,10 @@
 
 from flint import arb
 
-from ggxref.oracle.geometry import half_refraction
+from ggxref.oracle.geometry import half_reflection, half_refraction
 from ggxref.oracle.linalg import Vector, cosine, normalise
+from ggxref.oracle.masking import g1_ggx, g2_height_correlated
+from ggxref.oracle.ndf import ggx
 from ggxref.oracle.precision import sign
 
 
@@ -12,6 +14,15 @@ def brdf(wi: Vector, wo: Vector, D: arb, G2: arb, F: arb) -> arb:
     if sign(wi[2]) * sign(wo[2]) == 0:
         return arb(0)
     return D * G2 * F / (4 * abs(normalise(wi)[2]) * abs(normalise(wo)[2]))
+
+
+def brdf_ggx(wi: Vector, wo: Vector, alpha: Vector) -> arb:
+    """`brdf` of the GGX D and the height-correlated G2 at the half vector, F = 1; 0 unless both are above the horizon."""
+    if sign(wi[2]) <= 0 or sign(wo[2]) <= 0:
+        return arb(0)
+    h = half_reflection(wi, wo)
+    G2 = g2_height_correlated(g1_ggx(wi, h, alpha), g1_ggx(wo, h, alpha))
+    return brdf(wi, wo, ggx(h, alpha), G2, arb(1))
 
 
 def btdf(wi: Vector, wo: Vector, n_i: arb, n_o: arb, D: arb, G2: arb, F: arb) -> arb:

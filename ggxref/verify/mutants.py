@@ -197,6 +197,7 @@ MUTANTS = [
     # put together
     Mutant("bsdf.brdf", "2 for 4", lambda f: lambda wi, wo, D, G2, F: 2 * f(wi, wo, D, G2, F)),
     Mutant("bsdf.brdf", "cos θ_o lost", lambda f: lambda wi, wo, D, G2, F: f(wi, wo, D, G2, F) * jnp.abs(wo[2])),
+    Mutant("bsdf.brdf_ggx", "cos θ_o lost", lambda f: lambda wi, wo, alpha: f(wi, wo, alpha) * wo[2]),
     Mutant("bsdf.btdf", "n_o² lost", lambda f: lambda wi, wo, n_i, n_o, D, G2, F: f(wi, wo, n_i, n_o, D, G2, F) / n_o**2),
     Mutant("bsdf.btdf", "F for 1 - F", lambda f: lambda wi, wo, n_i, n_o, D, G2, F: f(wi, wo, n_i, n_o, D, G2, 1 - F)),
     Mutant("bsdf.weight_normals", "table 2 as printed", lambda f: lambda wi, wm, G2: f(wi, wm, G2) * jnp.abs(wi[2])),

@@ -68,6 +68,22 @@ def brdfs_are_reciprocal(brdf, *formulas):
 
 
 @check(
+    "BRDFs", "GGX in one expression of wi + wo is D G2 / (4 zi zo) at the half vector, and 0 below the horizon", "exact",
+    ["bsdf.brdf_ggx", "bsdf.brdf", "geometry.half_reflection", "ndf.ggx", "masking.g1_ggx", "masking.g2_height_correlated"],
+    tolerance=1e-12, mutant=("2 for 4", lambda f: lambda *v: 2 * f(*v)),
+)  # fmt: skip
+def one_expression(whole, brdf, half, D, g1, correlated):
+    errors = []
+    for alpha in (ALPHA, np.array([0.02, 1.5])):
+        i, o = cases.pairs(cases.UP, cases.hemisphere(150))
+        m = half(i, o)
+        parts = brdf(i, o, D(m, alpha), correlated(g1(i, m, alpha), g1(o, m, alpha)), 1.0)
+        below = whole(i, o * np.array([1, 1, -1]), alpha)
+        errors += [worst(relative(whole(i, o, alpha), parts)), worst(below)]
+    return max(errors)
+
+
+@check(
     "BRDFs", "weak white furnace: ∫ D G1(wi) /(4|wi·n|) dwo over the sphere is 1, or the clamp's loss", "quadrature",
     ["bsdf.brdf", *MODELS, "masking.g1_v_cavity", "geometry.reflect", "jacobian.reflection"], tolerance=1e-10,
     also=["walter2014 (4)"], mutant=("2 for 4", lambda f: lambda *v: 2 * f(*v)),

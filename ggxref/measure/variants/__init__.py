@@ -6,7 +6,7 @@ The library has one form of each; every other lives here, under a name and with 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ggxref.measure.variants import densities, directions, masking, ndf
+from ggxref.measure.variants import brdf, densities, directions, masking, ndf
 from ggxref.measure.variants.form import Variant
 
 
@@ -34,6 +34,8 @@ QUANTITIES = {
         Quantity("pdf", "visible-normal density", densities.exact_pdf, densities.PDF),
         Quantity("dot", "$\\omega_i\\cdot\\omega_m$", densities.exact_dot, densities.DOT),
         Quantity("fresnel", "$F$ (dielectric)", densities.exact_fresnel, densities.FRESNEL),
+        Quantity("half", "$\\omega_h$", brdf.exact_half, brdf.HALF),
+        Quantity("brdf", "$D G_2 F / 4 z_i z_o$ (conductor)", brdf.exact_brdf, brdf.BRDF),
         Quantity("turn", "$(\\cos 2\\pi u, \\sin 2\\pi u)$", directions.exact_turn, directions.TURN),
         Quantity("cap", "cap sampler", directions.exact_cap, directions.CAP),
         Quantity("cross_section", "cross-section sampler", directions.exact_cross_section, directions.CROSS_SECTION),

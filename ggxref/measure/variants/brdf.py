@@ -1,0 +1,71 @@
+"""Forms of the half vector and of a metal's whole BRDF [1/sr], a bounce's evaluation. `wi`, `wo`: unit, (3,), above the horizon."""
+
+import math
+
+import jax.numpy as jnp
+
+from ggxref import bsdf, fresnel, geometry, masking, ndf, stable
+from ggxref.measure import reference
+from ggxref.measure.variants.form import Variant
+
+# Nearly silver at 550 nm, in numbers that every dtype holds: index and extinction.
+ETA, K = 0.125, 3.5
+
+exact_half = reference.geometry_half_reflection
+
+
+def exact_brdf(wi, wo, alpha):
+    wi, wo = reference.unit(wi), reference.unit(wo)
+    wm = exact_half(wi, wo)
+    G2 = reference.masking_g2_height_correlated(*(reference.masking_g1_ggx(w, wm, alpha) for w in (wi, wo)))
+    cosine = wi[0] * wm[0] + wi[1] * wm[1] + wi[2] * wm[2]
+    F = reference.fresnel_conductor(cosine, ETA, K)
+    return reference.ndf_ggx(wm, alpha) * G2 * F / (4.0 * wi[2] * wo[2])
+
+
+def half_plain(wi, wo):
+    """The sum of the directions as they are, normalised."""
+    return jnp.stack(stable.unit(*(wi + wo)))
+
+
+def one_expression(wi, wo, alpha):
+    """The library's BRDF times F, whose cosine is ‖ω_i + ω_o‖/2."""
+    cosine = jnp.sqrt(sum(c * c for c in stable.unit_sum(wi, wo))) / 2
+    return bsdf.brdf_ggx(wi, wo, alpha) * fresnel.conductor(cosine, ETA, K)
+
+
+def composed(wi, wo, alpha, half=geometry.half_reflection):
+    """D, G1, G2 and F of the library, put together."""
+    wm = half(wi, wo)
+    G2 = masking.g2_height_correlated(masking.g1_ggx(wi, wm, alpha), masking.g1_ggx(wo, wm, alpha))
+    F = fresnel.conductor(stable.cosine(wi, wm), ETA, K)
+    return bsdf.brdf(wi, wo, ndf.ggx(wm, alpha), G2, F)
+
+
+def composed_plain(wi, wo, alpha):
+    """The same at the plain half vector."""
+    return composed(wi, wo, alpha, half_plain)
+
+
+def plain(wi, wo, alpha):
+    """The one expression with nothing compensated."""
+    x, y, z = wi + wo
+    square = x * x + y * y + z * z
+    q = ((x / alpha[0]) ** 2 + (y / alpha[1]) ** 2 + z * z) / square
+    length_i, length_o = (jnp.sqrt((alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2 + w[2] ** 2) for w in (wi, wo))
+    F = fresnel.conductor(jnp.sqrt(square) / 2, ETA, K)
+    return F / (2 * math.pi * (alpha[0] * q) * (alpha[1] * q) * (wo[2] * length_i + wi[2] * length_o))
+
+
+HALF = (
+    Variant("exact lengths", "ggxref.geometry.half_reflection", geometry.half_reflection),
+    Variant("plain sum", "dupuy2023 (6), every renderer", half_plain),
+)
+BRDF = (
+    Variant("one expression", "ggxref.bsdf.brdf_ggx", one_expression),
+    Variant("composed", "ggxref.bsdf.brdf of the library's D, G2 and F", composed),
+    Variant("composed, plain half vector", "the same at the plain half vector", composed_plain),
+    Variant("one expression, plain", "ggxref.bsdf.brdf_ggx with the plain sum of the directions", plain),
+)
+
+__all__ = ["BRDF", "HALF", "exact_brdf", "exact_half"]
