@@ -1,5 +1,6 @@
 """The command line: six verbs, and the only file that sees every part of the package."""
 
+import itertools
 import shlex
 import signal
 import sys
@@ -59,11 +60,10 @@ def _stages(total: int) -> Iterator[Callable[[str], None]]:
     """A bar like `_progress` of unlike stages; calls say which one begins."""
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("", total=total, completed=-1)
+        task, done = progress.add_task("", total=total), itertools.count()
 
         def say(stage: str) -> None:
-            progress.update(task, description=stage)
-            progress.advance(task, 1)
+            progress.update(task, description=stage, completed=next(done))
 
         yield say
 
