@@ -129,6 +129,10 @@ def _box(reference, block, dtype):
     return total
 
 
+# Smaller numbers have no double-double: their low part is subnormal.
+FAINTEST = 1e-270
+
+
 @dataclass(frozen=True)
 class Faults:
     """Results that no rounding explains; `flushed` is the hardware's: 0 for an exact value below the normal range."""
@@ -146,13 +150,15 @@ class Faults:
 def errors(run: Callable, reference: Callable, args, dtype) -> tuple[np.ndarray, np.ndarray, Faults]:
     """Error of each point, whether it is graded, and the faults. A fault's error is infinite.
 
-    Not graded: points whose exact value is infinite or beyond the dtype's range, or was flushed.
+    Not graded: points whose exact value is infinite or beyond the dtype's range, or was flushed; in float64 also those
+    below 1e-270, where a double-double has no low part left.
     """
     computed, truth = run(*args).astype(np.float64), exact(reference, args)
     info = ml_dtypes.finfo(dtype)
     size = np.abs(truth.hi)
     scalar = truth.hi.ndim == 1
-    graded = np.isfinite(truth.hi) & (size <= float(info.max))
+    faint = (np.maximum(size, np.abs(computed)) < FAINTEST) & (computed != truth.hi) & scalar
+    graded = np.isfinite(truth.hi) & (size <= float(info.max)) & ~faint
     nan, inf = np.isnan(computed) & graded, np.isinf(computed) & graded
     zero = (computed == 0) & (size >= float(info.smallest_normal)) & graded & scalar
     sign = (computed * truth.hi < 0) & graded & scalar

@@ -306,6 +306,14 @@ def geometry_half_reflection(wi, wo):
     return unit(_plus(unit(wi), unit(wo)))
 
 
+@_stands_for("bsdf.brdf_ggx")
+def bsdf_brdf_ggx(wi, wo, alpha):
+    wm, z_i, z_o = geometry_half_reflection(wi, wo), unit(wi)[2], unit(wo)[2]
+    seen = (z_i.hi > 0) & (z_o.hi > 0)
+    G2 = masking_g2_height_correlated(masking_g1_ggx(wi, wm, alpha), masking_g1_ggx(wo, wm, alpha))
+    return where(seen, ndf_ggx(wm, alpha) * G2 / where(seen, 4.0 * z_i * z_o, 1.0), 0.0)
+
+
 # densities
 
 

@@ -15,12 +15,9 @@ exact_half = reference.geometry_half_reflection
 
 
 def exact_brdf(wi, wo, alpha):
-    wi, wo = reference.unit(wi), reference.unit(wo)
-    wm = exact_half(wi, wo)
-    G2 = reference.masking_g2_height_correlated(*(reference.masking_g1_ggx(w, wm, alpha) for w in (wi, wo)))
-    cosine = wi[0] * wm[0] + wi[1] * wm[1] + wi[2] * wm[2]
-    F = reference.fresnel_conductor(cosine, ETA, K)
-    return reference.ndf_ggx(wm, alpha) * G2 * F / (4.0 * wi[2] * wo[2])
+    i, wm = reference.unit(wi), exact_half(wi, wo)
+    F = reference.fresnel_conductor(i[0] * wm[0] + i[1] * wm[1] + i[2] * wm[2], ETA, K)
+    return reference.bsdf_brdf_ggx(wi, wo, alpha) * F
 
 
 def half_plain(wi, wo):
