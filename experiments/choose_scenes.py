@@ -24,9 +24,9 @@ import numpy as np
 
 from ggxref.scene import build, compare, render
 from ggxref.scene.build import Choice
-from ggxref.scene.choose import AXES, COUNT
 from ggxref.scene.compare import Deviation
 from ggxref.scene.read import Scene, read
+from ggxref.scene.search import AXES, COUNT
 
 SCENES = Path(__file__).parent / "scenes"
 SEEDS = {"richest": (1001, 1003), "chosen": (2002, 2004)}

@@ -6,6 +6,7 @@ import pytest
 from ggxref.errors import InputError
 from ggxref.scene import choose, read
 from ggxref.scene.compare import Batches, Deviation
+from ggxref.scene.search import AXES, Search
 
 SCENE = """
 [view]
@@ -54,14 +55,13 @@ def search(tmp_path, monkeypatch):
     def measure(self, choices):
         asked.append(choices)
         losses = {
-            name: sum(LOSS[name].get(getattr(choice, axis), 0.0) for axis in choose.AXES)
-            for name, choice in choices.items()
+            name: sum(LOSS[name].get(getattr(choice, axis), 0.0) for axis in AXES) for name, choice in choices.items()
         }
         return {name: Deviation(loss, ERROR) for name, loss in losses.items()}
 
-    monkeypatch.setattr(choose._Search, "measure", measure)
-    monkeypatch.setattr(choose._Search, "cost", lambda self, name, choice: 100.0)
-    make = lambda tolerance: choose._Search(read.read(path), tolerance, lambda text: None)  # noqa: E731
+    monkeypatch.setattr(Search, "measure", measure)
+    monkeypatch.setattr(Search, "cost", lambda self, name, choice: 100.0)
+    make = lambda tolerance: Search(read.read(path), tolerance, lambda text: None)  # noqa: E731
     return make, asked
 
 
@@ -104,7 +104,7 @@ def test_what_costs_more_is_not_taken(search, monkeypatch):
     """The separable form is within; at a fifth more than the richest it is not worth its error, at a hundredth less it is."""
     for factor, expected in ((1.2, "height_correlated"), (0.99, "separable")):
         cost = lambda self, name, choice, factor=factor: 100.0 * (factor if choice.g2 == "separable" else 1)  # noqa: E731
-        monkeypatch.setattr(choose._Search, "cost", cost)
+        monkeypatch.setattr(Search, "cost", cost)
         assert settle(search[0](0.05))[0]["plain"].g2 == expected
 
 
@@ -138,8 +138,8 @@ def test_seconds_set_the_samples(tmp_path, monkeypatch):
     path = tmp_path / "scene.toml"
     path.write_text(SCENE + "[budget]\nseconds = 0.384\n")
     trial = Batches(np.zeros((8, 6, 8)), np.zeros((6, 8)), 1000.0)
-    monkeypatch.setattr(choose._Search, "_batches", lambda self, choices, samples: trial)
-    assert choose._Search(read.read(path), 0.1, print).samples == 1000
+    monkeypatch.setattr(Search, "_batches", lambda self, choices, samples: trial)
+    assert Search(read.read(path), 0.1, print).samples == 1000
 
 
 def test_an_option_is_measured_for_all_materials_at_once(search):

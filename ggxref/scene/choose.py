@@ -7,41 +7,25 @@ expectation of a picture, and are chosen by cost alone.
 """
 
 import math
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
 from ggxref.errors import InputError
-from ggxref.scene import build, compare, materials, render
+from ggxref.scene import build, materials
 from ggxref.scene.build import Choice
 from ggxref.scene.compare import Batches, Deviation
-from ggxref.scene.materials import BOUNDED, FRESNELS, G2S, PRECISIONS, TURNS
-from ggxref.scene.read import MOST, Material, Scene
+from ggxref.scene.materials import BOUNDED
+from ggxref.scene.read import Material, Scene
+from ggxref.scene.search import AXES, TRIAL, Choices, Search
 
-AXES = {
-    "model": build.MODELS,
-    "g2": G2S[:2],
-    "fresnel": FRESNELS,
-    "trigonometry": tuple(TURNS),
-    "precision": tuple(PRECISIONS),
-}
-"""Options of each axis, plainest first. V-cavities are another microsurface, not a plainer one."""
-COUNT = 8
-"""Batches: enough for an error of the error of 27 %."""
-TRIAL = 8
-"""Samples a pixel and batch that tell how long a sample takes."""
 DEARER = 1.1
 """Times the richest's cost: what an option may seem to cost and still be taken, as two timings of one program differ."""
 TURNS_OF_ALL = 15
 """Times that whole pictures, of `TRIAL` samples a batch, are rendered in turn: the middle ratio of their costs counts."""
 OF_MEDIAN = math.sqrt(math.pi / 2)
 """Standard error of a normal sample's median, in that of its mean."""
-MORE = 4
-"""Once, that many times the samples where an answer is within its error of the tolerance."""
-
-Choices = Mapping[str, Choice]
 
 
 @dataclass(frozen=True)
@@ -92,102 +76,6 @@ class Result:
     faster_error: float
 
 
-class _Search:
-    """Pictures of one scene, each rendered once. `say` is told what is done next."""
-
-    def __init__(self, scene: Scene, tolerance: float, say: Callable[[str], None]):
-        self.scene, self.tolerance, self.say = scene, tolerance, say
-        self.settings = render.Settings(scene.width, scene.height)
-        self.named = {material.name: material for material in scene.materials}
-        self.richest = {name: build.richest(material) for name, material in self.named.items()}
-        self.regions = {name: region for name, region in build.seen(scene).items() if region.any()}
-        self._references: dict[int, Batches] = {}
-        self._clock = compare.Clock()
-        self._costs: dict[Hashable, float] = {}
-
-    def _batches(self, choices: Choices, samples: int, *, by_row: bool = True, seed: int = 0) -> Batches:
-        kinds, world = build.world(self.scene, choices, by_row=by_row)
-        return compare.batches(kinds, world, self.settings, count=COUNT, samples=samples, seed=seed)
-
-    @cached_property
-    def samples(self) -> int:
-        """Samples a pixel of a batch: those of the file, or what fits in its seconds."""
-        if not self.scene.seconds:
-            return max(self.scene.samples // COUNT, 2)
-        ns = self._batches(self.richest, TRIAL).ns_per_sample
-        pixels = self.scene.width * self.scene.height * COUNT
-        return min(max(int(self.scene.seconds * 1e9 / (ns * pixels)), 2), MOST // pixels)
-
-    def _reference(self, samples: int) -> Batches:
-        if samples not in self._references:
-            self._references[samples] = self._batches(self.richest, samples)
-        return self._references[samples]
-
-    def measure(self, choices: Choices) -> dict[str, Deviation]:
-        """From the richest, per material; with more samples where the first leave it open."""
-        found: dict[str, Deviation] = {}
-        for samples in (self.samples, MORE * self.samples):
-            found = compare.deviations(self._batches(choices, samples), self._reference(samples), self.regions)
-            if not any(each.least < self.tolerance <= each.most for each in found.values()):
-                break
-        return found
-
-    def within(self, deviation: Deviation) -> bool:
-        """Strictly: within 0 is nothing, so tolerance 0 keeps the richest."""
-        return deviation.most < self.tolerance
-
-    def takes(self, step: Step) -> bool:
-        return self.within(step.deviation) and step.ns <= DEARER * self.cost(step.material, self.richest[step.material])
-
-    def options(self, material: Material, axis: str) -> tuple[str, ...]:
-        """What is plainer than the material's richest on an axis."""
-        fixed = {"dielectric": ("fresnel",), "diffuse": tuple(AXES)}.get(material.surface, ())
-        if axis in fixed or (axis == "trigonometry" and self.richest[material.name].sampler not in materials.TURNING):
-            return ()
-        every = AXES[axis]
-        return every[: every.index(getattr(self.richest[material.name], axis))]
-
-    def cost(self, name: str, choice: Choice) -> float:
-        """Of a bounce's formulas [ns]. Stored precision costs memory, not formulas.
-
-        A form of G2, of Fresnel or of trigonometry is a small part, timed by itself: compiled with the rest, it would be
-        lost in what the compiler makes of the rest.
-        """
-        richest = self.richest[name]
-        forms = {axis: (getattr(richest, axis), getattr(choice, axis)) for axis in compare.USES}
-        richer = replace(choice, precision=richest.precision, **{axis: rich for axis, (rich, _) in forms.items()})
-        kind, (rows,) = self._kind(name, richer)
-        ns = self._once(kind, lambda: self._clock.bounce(kind, rows))
-        for axis, options in forms.items():
-            if len(set(options)) > 1:
-                rich, plain = (
-                    self._once((axis, each), lambda: self._clock.part(axis, each, rows))  # noqa: B023
-                    for each in options
-                )
-                ns += plain - rich
-        return ns
-
-    def _kind(self, name: str, choice: Choice) -> tuple[materials.Kind, tuple[materials.Rows, ...]]:
-        kinds, world = build.world(replace_materials(self.scene, self.named[name]), {name: choice})
-        return kinds[0], world.rows
-
-    def _once(self, key: Hashable, measure: Callable[[], float]) -> float:
-        if key not in self._costs:
-            self._costs[key] = measure()
-        return self._costs[key]
-
-    def whole(self, choices: Choices, samples: int, seed: int = 0) -> Batches:
-        """With the formulas compiled for these choices alone: what they cost. What rounds to a stored precision is left out."""
-        choices = {name: replace(choice, precision="float32") for name, choice in choices.items()}
-        return self._batches(choices, samples, by_row=False, seed=seed)
-
-
-def replace_materials(scene: Scene, material: Material) -> Scene:
-    """The scene with one material, and only the shapes that have it."""
-    shapes = tuple(shape for shape in scene.shapes if shape["material"] == material.name)
-    return replace(scene, materials=(material,), shapes=shapes)
-
-
 def with_option(material: Material, choice: Choice, axis: str, option: str) -> Choice:
     """The choice with one axis changed, and a sampler that can draw what it then has."""
     choice = replace(choice, **{axis: option})
@@ -198,7 +86,7 @@ def with_option(material: Material, choice: Choice, axis: str, option: str) -> C
 
 def stages(scene: Scene) -> int:
     """How often `choose` says what it does, at most but for what it takes back."""
-    search = _Search(scene, 0.0, lambda text: None)
+    search = Search(scene, 0.0, lambda text: None)
     options = {(axis, each) for material in scene.materials for axis in AXES for each in search.options(material, axis)}
     return 3 + len(options) + sum(material.surface != "diffuse" for material in scene.materials)
 
@@ -207,7 +95,7 @@ def choose(scene: Scene, tolerance: float, say: Callable[[str], None] = lambda t
     """Search; `say` is told what is done next."""
     if not (np.isfinite(tolerance) and tolerance >= 0):
         raise InputError(f"--tolerance = {tolerance:g}; need 0 or a positive number, the deviation over mean radiance")
-    search = _Search(scene, tolerance, say)
+    search = Search(scene, tolerance, say)
     visible = [name for name in search.named if name in search.regions]
     if not visible:
         raise InputError(f"{scene.path}: view sees none of the shapes; there is nothing to choose for")
@@ -226,7 +114,7 @@ def choose(scene: Scene, tolerance: float, say: Callable[[str], None] = lambda t
     return Result(*found, faster, error)
 
 
-def _steps(search: _Search) -> tuple[Step, ...]:
+def _steps(search: Search) -> tuple[Step, ...]:
     steps = []
     for axis, every in AXES.items():
         for option in every:
@@ -246,19 +134,24 @@ def _steps(search: _Search) -> tuple[Step, ...]:
     return tuple(steps)
 
 
-def _affordable(search: _Search, steps: tuple[Step, ...]) -> dict[str, Choice]:
+def _takes(search: Search, step: Step) -> bool:
+    cheap = step.ns <= DEARER * search.cost(step.material, search.richest[step.material])
+    return cheap and search.within(step.deviation)
+
+
+def _affordable(search: Search, steps: tuple[Step, ...]) -> dict[str, Choice]:
     """Per material and axis the plainest option that alone is within the tolerance, and no dearer."""
     choices = dict(search.richest)
     for axis in AXES:
         for step in reversed(steps):  # the plainest is taken last
-            if step.axis == axis and search.takes(step):
+            if step.axis == axis and _takes(search, step):
                 material = search.named[step.material]
                 choices[step.material] = with_option(material, choices[step.material], axis, step.option)
     return choices
 
 
 def _together(
-    search: _Search, choices: dict[str, Choice], steps: tuple[Step, ...]
+    search: Search, choices: dict[str, Choice], steps: tuple[Step, ...]
 ) -> tuple[dict[str, Choice], dict[str, Deviation]]:
     """Measure them as one picture; take back, one at a time, the largest step of a material that is too far off."""
     while True:
@@ -279,7 +172,7 @@ def _together(
         choices[worst.material] = with_option(material, choices[worst.material], axis, richer)
 
 
-def _samplers(search: _Search, chosen: dict[str, Choice]) -> tuple[Sampler, ...]:
+def _samplers(search: Search, chosen: dict[str, Choice]) -> tuple[Sampler, ...]:
     """Exact samplers of one density share its variance; the others' is measured, if a sample of theirs is cheaper."""
     found: list[Sampler] = []
     base: Batches | None = None
@@ -307,7 +200,7 @@ def _samplers(search: _Search, chosen: dict[str, Choice]) -> tuple[Sampler, ...]
     return tuple(found)
 
 
-def _all_with(search: _Search, chosen: dict[str, Choice], sampler: str) -> dict[str, Choice]:
+def _all_with(search: Search, chosen: dict[str, Choice], sampler: str) -> dict[str, Choice]:
     return {
         name: replace(choice, sampler=sampler)
         if sampler in materials.samplers(build.kind_of(search.named[name], choice))
@@ -316,7 +209,7 @@ def _all_with(search: _Search, chosen: dict[str, Choice], sampler: str) -> dict[
     }
 
 
-def _cheapest_samplers(search: _Search, chosen: dict[str, Choice], samplers: tuple[Sampler, ...]) -> dict[str, Choice]:
+def _cheapest_samplers(search: Search, chosen: dict[str, Choice], samplers: tuple[Sampler, ...]) -> dict[str, Choice]:
     """Materials of one kind share a sampler, by their pixels' effort: a second sampler would be a second branch for all."""
     best = dict(chosen)
     sampled = {each.material: {other.sampler: other.effort for other in samplers if other.material == each.material}
@@ -331,7 +224,7 @@ def _cheapest_samplers(search: _Search, chosen: dict[str, Choice], samplers: tup
 
 
 def _fastest(
-    search: _Search, candidates: list[dict[str, Choice]]
+    search: Search, candidates: list[dict[str, Choice]]
 ) -> tuple[dict[str, Choice], dict[str, Batches], float, float]:
     """Of whole pictures, the first of them the richest, the one with the least time at equal noise; both; how much faster
     it is, and the standard error of that.

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ggxref.scene import materials, render
+from ggxref.scene import materials, render, shading
 from ggxref.scene.materials import Kind, Rows
 
 SURE = 2.0
@@ -114,7 +114,7 @@ class Clock:
 
         def formulas(u, v):
             wi, light = (tuple(jax.vmap(materials.cosine_lobe, -1, -1)(pair)) for pair in (v[:2], v[2:]))
-            return render.bounce(kind, render.row_of(rows, jnp.int32(0)), tuple(u), wi, light)
+            return shading.bounce(kind, shading.row_of(rows, jnp.int32(0)), tuple(u), wi, light)
 
         return self._measure(formulas)
 

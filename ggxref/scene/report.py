@@ -14,8 +14,9 @@ from rich.text import Text
 
 from ggxref.scene import image
 from ggxref.scene.build import Choice
-from ggxref.scene.choose import AXES, DEARER, Result, Sampler, Step
+from ggxref.scene.choose import DEARER, Result, Sampler, Step
 from ggxref.scene.compare import Deviation
+from ggxref.scene.search import AXES
 
 
 @dataclass(frozen=True)
