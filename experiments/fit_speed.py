@@ -1,6 +1,9 @@
 """How long do fits take: 100 materials of 10⁴ samples through the whole ladder, and one of them beside scipy's least squares?
 
-python experiments/fit_speed.py --materials 100
+    OPENBLAS_NUM_THREADS=1 taskset -c 0 python experiments/fit_speed.py scipy
+    python experiments/fit_speed.py ladder --materials 100
+
+The comparison is fair on one core without BLAS's threads alone: waiting for each other they take twice SciPy's processor time.
 """
 
 import argparse
@@ -57,7 +60,7 @@ def numpy_residuals(theta, wi, wo, wm, f, noise):
     return r * np.sqrt(2 / (1 + np.sqrt(1 + r * r)))
 
 
-REPEATS = 7
+REPEATS = 15
 
 
 def beside_scipy(data: Reflectance) -> None:
@@ -73,10 +76,11 @@ def beside_scipy(data: Reflectance) -> None:
 
     space = parameters.space(parameters.SHAPES["ellipsoid"], problem.parameters, {}, problem.scale)
     bank = lobes.bank([problem])
-    assert problem.surface
-    lanes = rows.Lanes(problem.surface, bank.all, bank.of, [bank.all.weights])
+    surface = problem.surface
+    assert surface
 
     def ours():
+        lanes = rows.Lanes(surface, bank.all, bank.of, [bank.all.weights])
         return levenberg.minimise(
             lanes.terms, start[None], space.basis[None], lanes.samples, settled=lobes.SETTLED, most=lobes.MOST_STEPS
         )
@@ -85,12 +89,16 @@ def beside_scipy(data: Reflectance) -> None:
         return scipy.optimize.least_squares(residuals, start[keep])
 
     ours()
-    # In turns, and the least of each: whatever else the machine does slows both.
+    # In turns, and the least and the middle of each: whatever else the machine does slows both.
     rounds = [(timed(ours), timed(theirs)) for _ in range(REPEATS)]
-    (mine, cpu), (found, cpu_scipy) = (min(column, key=lambda each: each[1]) for column in zip(*rounds, strict=True))
-    print(f"one fit of {problem.size} samples from one start: {cpu:.3f} s CPU, loss {mine.loss[0]:.12f}")
-    print(f"scipy.optimize.least_squares: {cpu_scipy:.3f} s CPU, loss {found.cost / problem.size:.12f}, {found.nfev} steps; "
-          f"{cpu_scipy / cpu:.1f} x our CPU time, least of {REPEATS} each")  # fmt: skip
+    (mine, _), (found, _) = rounds[0]
+    cpu, cpu_scipy = np.array([[each[1] for each in pair] for pair in rounds]).T
+    print(f"one fit of {problem.size} samples from one start: {cpu.min():.4f} s CPU, loss {mine.loss[0]:.12f}")
+    print(
+        f"scipy.optimize.least_squares: {cpu_scipy.min():.4f} s CPU, loss {found.cost / problem.size:.12f}, {found.nfev} steps"
+    )
+    print(f"ratio of the least of {REPEATS}: {cpu_scipy.min() / cpu.min():.1f}, "
+          f"of the medians: {np.median(cpu_scipy) / np.median(cpu):.1f}")  # fmt: skip
 
 
 def timed(solve):
@@ -102,10 +110,13 @@ def timed(solve):
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("part", choices=("scipy", "ladder"))
     parser.add_argument("--materials", type=int, default=100)
     parser.add_argument("--samples", type=int, default=10_000)
     given = parser.parse_args()
-    beside_scipy(measured(given.samples, 0))
+    if given.part == "scipy":
+        beside_scipy(measured(given.samples, 0))
+        return
     options = Options(samples=10**6)
 
     def ladders(count: int, samples: int) -> tuple[float, float]:

@@ -150,14 +150,20 @@ class TestRows:
         r = np.log((model * wo[2] + 0.01) / (self.MEASURED * wo[2] + 0.01))
         return 1.5 * np.sum(np.mean(np.sqrt(1 + r * r) - 1, axis=0))
 
+    def at(self, theta, some):
+        return rows.each(Surface(), theta[None], rows.pack(some, np.zeros(1, int), some.weights), lambda each: each)[0]
+
     def test_losses_and_gradients(self):
         some = self.rows()
-        found = rows.each(Surface(), self.BANDS[None], some, np.zeros(1, int), some.weights)[0]
+        found = self.at(self.BANDS, some)
+        loss, gradient, _ = found.terms()
         assert_allclose((found.losses.mean(axis=1) * some.weights).sum(), self.loss(self.BANDS), rtol=1e-12)
+        assert_allclose(loss[0], self.loss(self.BANDS), rtol=1e-12)
         step = 1e-6 * np.eye(len(self.BANDS))
         slope = [(self.loss(self.BANDS + s) - self.loss(self.BANDS - s)) / 2e-6 for s in step]
         # Differences over 1e-6 keep ten digits of a loss of order 100.
-        assert_allclose(found.scores.sum(axis=-1)[0], slope, rtol=1e-6, atol=1e-6)
+        assert_allclose(gradient[0], slope, rtol=1e-6, atol=1e-6)
+        assert_allclose(found.scores().sum(axis=-1), gradient, rtol=1e-10, atol=1e-12 * np.abs(gradient).max())
 
     def test_the_matrices_at_a_perfect_fit_are_the_hessian(self):
         """There r = 0, so that both weights are 1 and what they leave out is 0."""
@@ -166,23 +172,23 @@ class TestRows:
         with solver.float64():
             exact = models.brdfs(self.BANDS, wi, wo, wm, Surface())
         some.samples[3][0, :, : exact.shape[1]] = exact
-        found = rows.each(Surface(), self.BANDS[None], some, np.zeros(1, int), some.weights)[0]
-        assert_allclose(found.hessian, found.bread, rtol=1e-12)
+        found = self.at(self.BANDS, some)
+        hessian = found.terms().hessian
+        assert_allclose(found.bread(), hessian, rtol=1e-12)
         step = 1e-5 * np.eye(len(self.BANDS))
         ahead, behind = (
-            np.stack([rows.each(Surface(), (self.BANDS + sign * s)[None], some, np.zeros(1, int), some.weights)[0]
-                      .scores.sum(axis=-1)[0] for s in step]) for sign in (1, -1)
-        )  # fmt: skip
-        assert_allclose(found.hessian[0], (ahead - behind) / 2e-5, rtol=1e-6, atol=1e-6 * np.abs(found.hessian).max())
+            np.stack([self.at(self.BANDS + sign * s, some).terms().gradient[0] for s in step]) for sign in (1, -1)
+        )
+        assert_allclose(hessian[0], (ahead - behind) / 2e-5, rtol=1e-6, atol=1e-6 * np.abs(hessian).max())
 
     def test_calls_in_pieces_are_the_same(self):
         some = self.rows()
         many = np.zeros(2 * rows.CALL + 3, int)
         theta = self.BANDS + 0.01 * np.arange(len(many))[:, None]
-        pieces = rows.each(Surface(), theta, some, many, some.weights[many])
-        alone = rows.each(Surface(), theta[-1:], some, many[:1], some.weights)[0]
+        pieces = rows.each(Surface(), theta, rows.pack(some, many, some.weights[many]), lambda each: each)
+        alone = self.at(theta[-1], some)
         assert [len(piece.losses) for piece in pieces] == [rows.CALL, rows.CALL, 3]
-        assert_allclose(pieces[-1].scores[-1], alone.scores[0], rtol=1e-12)
+        assert_allclose(pieces[-1].factors[-1], alone.factors[0], rtol=1e-12)
 
 
 class TestLevenberg:

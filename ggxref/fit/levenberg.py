@@ -50,14 +50,14 @@ def minimise(
     damping, growth = np.full(len(theta), FIRST_DAMPING), np.full(len(theta), 2.0)
     loss, gradient, hessian = (part.copy() for part in _reduced(evaluate(theta, np.arange(len(theta))), bases))
     active = np.isfinite(loss)
+    valley = _Quadratic(*(part.copy() for part in _quadratic(hessian, gradient)))
     for _ in range(most):
-        left = np.array([_descent(h, g) for h, g in zip(hessian, gradient, strict=True)])
-        met |= active & (left <= settled**2 * loss / samples + NEGLIGIBLE)
+        met |= active & (valley.descent() <= settled**2 * loss / samples + NEGLIGIBLE)
         active &= ~met & (damping < LAST_DAMPING)
         lanes = np.flatnonzero(active)
         if not len(lanes):
             break
-        step = np.stack([_step(hessian[k], gradient[k], damping[k]) for k in lanes])
+        step = _Quadratic(*(part[lanes] for part in valley)).step(damping[lanes])
         predicted = -np.einsum("li,li->l", step, gradient[lanes] + np.einsum("lij,lj->li", hessian[lanes], step) / 2)
         there = theta[lanes] + np.einsum("lpi,li->lp", bases[lanes], step)
         trial = _reduced(evaluate(there, lanes), bases[lanes])
@@ -66,6 +66,8 @@ def minimise(
         taken = lanes[better]
         theta[taken], loss[taken] = there[better], trial.loss[better]
         gradient[taken], hessian[taken] = trial.gradient[better], trial.hessian[better]
+        for part, new in zip(valley, _quadratic(hessian[taken], gradient[taken]), strict=True):
+            part[taken] = new
         # Nielsen's rule: less damping the better the quadratic model foretold the descent, and quickly more where it failed.
         damping[taken] *= np.maximum(1 / 10, 1 - (2 * np.minimum(gain[better], 1) - 1) ** 3)
         growth[taken] = 2.0
@@ -79,32 +81,48 @@ def minimise(
 
 def _reduced(terms: Terms, bases: np.ndarray) -> Terms:
     """In y; an unused column gets a 1 on the diagonal, which leaves its step 0."""
-    hessian = np.einsum("lpi,lpq,lqj->lij", bases, terms.hessian, bases)
-    unused = ~bases.any(axis=1)
-    lane, column = np.nonzero(unused)
+    sound = (
+        np.isfinite(terms.loss) & np.isfinite(terms.hessian).all(axis=(1, 2)) & np.isfinite(terms.gradient).all(axis=1)
+    )
+    gradient, hessian = (
+        np.where(sound.reshape(-1, *[1] * (a.ndim - 1)), a, 0) for a in (terms.gradient, terms.hessian)
+    )
+    hessian = bases.swapaxes(1, 2) @ hessian @ bases
+    lane, column = np.nonzero(~bases.any(axis=1))
     hessian[lane, column, column] = 1.0
-    loss = np.where(np.isfinite(terms.loss) & np.isfinite(hessian).all(axis=(1, 2)), terms.loss, np.inf)
-    return Terms(loss, np.einsum("lpi,lp->li", bases, terms.gradient), hessian)
+    return Terms(np.where(sound, terms.loss, np.inf), np.einsum("lpi,lp->li", bases, gradient), hessian)
 
 
-def _scale(hessian: np.ndarray) -> np.ndarray:
-    """The roots of the diagonal; a direction that changes nothing gets a small one, so that it is not followed."""
-    diagonal = np.diag(hessian)
-    return np.sqrt(np.maximum(diagonal, 1e-12 * max(diagonal.max(), 1e-300)))
+class _Quadratic(NamedTuple):
+    """Of each lane the quadratic model, in units (l, p) that make the Hessian's diagonal 1: its eigenvalues (l, p), its eigenvectors
+    (l, p, p), and the gradient along them (l, p).
+    """
+
+    unit: np.ndarray
+    curvature: np.ndarray
+    axes: np.ndarray
+    along: np.ndarray
+
+    def step(self, damping: np.ndarray) -> np.ndarray:
+        """To the minimum of the model with its curvatures raised by `damping` (l,)."""
+        raised = self.curvature + damping[:, None]
+        step = -np.einsum("lij,lj->li", self.axes, _over(self.along, raised, 1e-14)) / self.unit
+        return step * np.minimum(1.0, LONGEST / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-300))
+
+    def descent(self) -> np.ndarray:
+        """What the undamped step would bring, gᵀH⁻¹g/2; along valleys, where it cannot be told, nothing."""
+        return (self.along * _over(self.along, self.curvature, 1e-9)).sum(axis=1) / 2
 
 
-def _step(hessian: np.ndarray, gradient: np.ndarray, damping: float) -> np.ndarray:
-    unit = _scale(hessian)
-    scaled = hessian / np.outer(unit, unit) + damping * np.eye(len(unit))
-    step = -np.linalg.lstsq(scaled, gradient / unit, rcond=1e-14)[0] / unit
-    return step * min(1.0, LONGEST / max(np.abs(step).max(), 1e-300))
+def _over(along: np.ndarray, curvature: np.ndarray, least: float) -> np.ndarray:
+    """The quotient, and 0 where the curvature is below that share of the largest."""
+    steep = curvature > least * curvature.max(axis=1, keepdims=True)
+    return np.where(steep, along / np.where(steep, curvature, 1), 0)
 
 
-def _descent(hessian: np.ndarray, gradient: np.ndarray) -> float:
-    """What the undamped step would bring, gᵀH⁻¹g/2; along valleys, where it cannot be told, nothing."""
-    if not np.isfinite(hessian).all():
-        return np.inf
-    unit = _scale(hessian)
-    inverse = np.linalg.pinv(hessian / np.outer(unit, unit), rcond=1e-9, hermitian=True)
-    scaled = gradient / unit
-    return float(scaled @ inverse @ scaled) / 2
+def _quadratic(hessian: np.ndarray, gradient: np.ndarray) -> _Quadratic:
+    diagonal = np.diagonal(hessian, axis1=1, axis2=2)
+    # A direction that changes nothing gets a small unit's inverse, so that it is not followed.
+    unit = np.sqrt(np.maximum(diagonal, 1e-12 * np.maximum(diagonal.max(axis=1, keepdims=True, initial=0), 1e-300)))
+    curvature, axes = np.linalg.eigh(hessian / (unit[:, :, None] * unit[:, None]))
+    return _Quadratic(unit, curvature, axes, np.einsum("lij,li->lj", axes, gradient / unit))

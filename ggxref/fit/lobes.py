@@ -116,25 +116,30 @@ def _curvature(bank: Bank, surface, k: int, theta: np.ndarray, space: Space) -> 
     few = len(np.unique(problem.block)) <= MOST_BLOCKS
     cut, block = rows.cut_by_block(problem) if few else (rows.cut(problem), np.zeros(0, int))
     which = np.arange(len(cut.index))
-    found = _join(rows.each(surface, np.tile(theta, (len(which), 1)), cut, which, cut.weights))
-    gradient = found.scores.sum(axis=-1)
+
+    def of(each: Each) -> tuple[np.ndarray, ...]:
+        # Where no row straddles two blocks, the rows' sums will do.
+        return each.terms().gradient, each.bread(), np.zeros(0) if few else each.scores()
+
+    at = np.tile(theta, (len(which), 1))
+    gradient, bread, each = _joined(rows.each(surface, at, rows.pack(cut, which, cut.weights), of))
     if few:
         numbers = np.unique(block)
         scores = np.stack([gradient[block == b].sum(axis=0) for b in numbers]) @ columns
-        parts = np.stack([columns.T @ found.bread[block == b].sum(axis=0) @ columns for b in numbers])
+        parts = np.stack([columns.T @ bread[block == b].sum(axis=0) @ columns for b in numbers])
         # All of a block is in one fold.
         fold = problem.fold[cut.index[:, 0]]
     else:
         inside = cut.index >= 0
-        each = columns.T @ found.scores.swapaxes(0, 1)[:, inside]
+        each = columns.T @ each.swapaxes(0, 1)[:, inside]
         scores = np.stack([np.bincount(problem.block[cut.index[inside]], row) for row in each], axis=1)
         parts, fold = None, cut.fold
-    sums = [np.stack([part[fold == f].sum(axis=0) for f in range(fold.max() + 1)]) for part in (gradient, found.bread)]
-    return Curvature(columns.T @ found.bread.sum(axis=0) @ columns, scores, parts), _Folds(*sums)
+    sums = [np.stack([part[fold == f].sum(axis=0) for f in range(fold.max() + 1)]) for part in (gradient, bread)]
+    return Curvature(columns.T @ bread.sum(axis=0) @ columns, scores, parts), _Folds(*sums)
 
 
-def _join(pieces: list[Each]) -> Each:
-    return Each(*(np.concatenate(parts) for parts in zip(*pieces, strict=True)))
+def _joined(pieces: list[tuple[np.ndarray, ...]]) -> list[np.ndarray]:
+    return [np.concatenate(parts) for parts in zip(*pieces, strict=True)]
 
 
 def _held_out(
@@ -159,8 +164,9 @@ def _held_out(
 def _losses_of(bank: Bank, surface, k: int, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The mean loss on each fold f of problem k at θ_f (folds, p), and there on each block."""
     problem, which = bank.problems[k], bank.of[k]
-    found = rows.each(surface, theta[bank.all.fold[which]], bank.all, which, bank.all.weights[which])
-    index, loss = bank.all.index[which], np.concatenate([piece.losses.mean(axis=1) for piece in found])
+    pieces = rows.pack(bank.all, which, bank.all.weights[which])
+    found = rows.each(surface, theta[bank.all.fold[which]], pieces, lambda each: each.losses.mean(axis=1))
+    index, loss = bank.all.index[which], np.concatenate(found)
     every = np.empty(problem.size)
     every[index[index >= 0]] = loss[index >= 0]
     weights = problem.weights
@@ -183,10 +189,11 @@ def _residuals(bank: Bank, surface, k: int, theta: np.ndarray) -> np.ndarray:
     problem, which = bank.problems[k], bank.of[k]
     *directions, measured, noise = bank.all.samples
     plain = bank.all._replace(samples=(*directions, np.where(measured > 0, measured, 1.0), np.zeros_like(noise)))
-    found = _join(rows.each(surface, np.tile(theta, (len(which), 1)), plain, which, bank.all.weights[which]))
+    pieces = rows.pack(plain, which, bank.all.weights[which])
+    found = np.concatenate(rows.each(surface, np.tile(theta, (len(which), 1)), pieces, lambda each: each.losses))
     index = bank.all.index[which]
     residuals = np.empty((problem.size, measured.shape[1]))
     # The pseudo-Huber loss l = √(1 + r²) − 1, turned round: r² = l (l + 2).
-    loss = found.losses.swapaxes(1, 2)[index >= 0]
+    loss = found.swapaxes(1, 2)[index >= 0]
     residuals[index[index >= 0]] = np.sqrt(loss * (loss + 2))
     return np.where(problem.samples[3].T > 0, residuals, np.nan)

@@ -13,11 +13,13 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from ggxref import bsdf, ellipsoid, fresnel, masking, slopes
+from ggxref import fresnel, masking, slopes
 from ggxref.fit import student
 from ggxref.fit.parameters import FRESNEL, SHAPE
 
 Vector = Array | np.ndarray
+Entries = Array | tuple[Array, ...]
+"""Of θ: in an array, or one by one."""
 
 
 @dataclass(frozen=True)
@@ -29,19 +31,22 @@ class Surface:
     fresnel: str = "schlick"
 
 
-def gamma(theta: Array) -> Array:
+def gamma(theta: Entries) -> Array:
     return 1.5 + jnp.exp(theta[5])
 
 
-# Each takes its second argument, θ, for the tail alone.
-DENSITY: dict[str, Callable[[Array, Array], Array]] = {
-    "ggx": lambda slope, _: slopes.ggx(slope, jnp.ones_like(slope)),
-    "beckmann": lambda slope, _: slopes.beckmann(slope, jnp.ones_like(slope)),
-    "student_t": lambda slope, theta: slopes.student_t(slope, jnp.ones_like(slope), gamma(theta)),
+# The standard ones, at α = 1: of the slope's square length, and of the direction's (x, y, z), of any length. Numbers one by one, not
+# vectors: a derivative by an entry of a vector is a vector of zeros but for one, and XLA computes with all of them.
+# They take θ for the tail alone.
+DENSITY: dict[str, Callable[[Array, Entries], Array]] = {
+    "ggx": lambda square, _: 1 / (math.pi * (1 + square) ** 2),
+    "beckmann": lambda square, _: jnp.exp(-square) / math.pi,
+    "student_t": lambda square, theta: jnp.exp(-gamma(theta) * jnp.log1p(square / (gamma(theta) - 1))) / math.pi,
 }
-AREA: dict[str, Callable[[Array, Array], Array]] = {
-    "ggx": lambda w, _: slopes.sigma_ggx(w, jnp.ones_like(w[:2])),
-    "beckmann": lambda w, _: slopes.sigma_beckmann(w, jnp.ones_like(w[:2])),
+AREA: dict[str, Callable[[tuple[Array, Array, Array], Entries], Array]] = {
+    # `slopes.sigma_ggx` but for its care of directions below the horizon, of which G1 is 1.
+    "ggx": lambda w, _: (jnp.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) + w[2]) / 2,
+    "beckmann": lambda w, _: slopes.sigma_beckmann(jnp.stack(w), jnp.ones_like(jnp.stack(w[:2]))),
     "student_t": lambda w, theta: student.sigma(w, gamma(theta)),
 }
 
@@ -53,42 +58,47 @@ def shape_matrix(theta: Vector) -> Array:
     return jnp.stack([jnp.stack(row) for row in rows])
 
 
-def standard_slope(theta: Array, slope: Array) -> Array:
-    """C⁻¹(slope − mean), (2,)."""
+def standard_square(theta: Entries, slope: Vector | tuple[Array, Array]) -> Array:
+    """‖C⁻¹(slope − mean)‖²."""
     u = (slope[0] - theta[3]) * jnp.exp(-theta[0])
-    return jnp.stack([u, (slope[1] - theta[4] - theta[2] * u) * jnp.exp(-theta[1])])
+    v = (slope[1] - theta[4] - theta[2] * u) * jnp.exp(-theta[1])
+    return u * u + v * v
 
 
-def slope_density(theta: Array, slope: Array, tail: str) -> Array:
+def slope_density(theta: Entries, slope: Vector | tuple[Array, Array], tail: str) -> Array:
     """P22 at a slope, (2,). With GGX's tail it is `slopes.ellipsoid`, without a matrix to bring to canonical form."""
-    return DENSITY[tail](standard_slope(theta, slope), theta) * jnp.exp(-theta[0] - theta[1])
+    return DENSITY[tail](standard_square(theta, slope), theta) * jnp.exp(-theta[0] - theta[1])
 
 
 def log_slope_density(theta: Array, slope: Array, tail: str) -> Array:
     """log P22; Beckmann's in closed form, as its density is 0 in floating point 27 roughnesses off."""
-    standard = standard_slope(theta, slope)
-    if tail == "beckmann":
-        logarithm = -standard[0] * standard[0] - standard[1] * standard[1] - math.log(math.pi)
-    else:
-        logarithm = jnp.log(DENSITY[tail](standard, theta))
+    square = standard_square(theta, slope)
+    logarithm = -square - math.log(math.pi) if tail == "beckmann" else jnp.log(DENSITY[tail](square, theta))
     return logarithm - theta[0] - theta[1]
 
 
-def g1(theta: Array, w: Array, tail: str) -> Array:
-    """Smith's G1 for `w`, (3,), above the horizon and micronormals that it sees, at most 1 as in walter2014 (6).
+def unmasking(theta: Entries, w: Array, tail: str) -> Array:
+    """1 + Λ = 1/G1 for `w`, (3,), above the horizon: the area seen from it over its cosine, at least 1 as in walter2014 (6).
 
-    With GGX's tail it is `masking.g1_ellipsoid`: in canonical form the area seen from w is the standard one from A w.
+    With GGX's tail it is that of `masking.g1_ellipsoid`: in canonical form the area seen from w is the standard one from A w.
     """
-    stretched = jnp.stack(ellipsoid.times(shape_matrix(theta), *w))
-    return jnp.minimum(1, w[2] / AREA[tail](stretched, theta))
+    # `shape_matrix` times w, without its zeros.
+    x, y = jnp.exp(theta[0]) * w[0] + theta[2] * w[1], jnp.exp(theta[1]) * w[1]
+    z = w[2] - theta[3] * w[0] - theta[4] * w[1]
+    return jnp.maximum(1, AREA[tail]((x, y, z), theta) * (1 / w[2]))
 
 
-def g2(theta: Array, wi: Array, wo: Array, wm: Array, surface: Surface) -> Array:
+def g1(theta: Entries, w: Array, tail: str) -> Array:
+    """Smith's G1 for `w`, (3,), above the horizon and micronormals that it sees."""
+    return 1 / unmasking(theta, w, tail)
+
+
+def g2(theta: Entries, wi: Array, wo: Array, wm: Array, surface: Surface) -> Array:
     """G2 for reflection. V-cavities know no α: their cavities are symmetrical about n, whatever the slopes' mean."""
     if surface.masking == "v_cavity":
         return masking.g2_v_cavity(wi, wo, wm)
-    combine = {"height_correlated": masking.g2_height_correlated, "separable": masking.g2_separable}[surface.masking]
-    return combine(g1(theta, wi, surface.tail), g1(theta, wo, surface.tail))
+    i, o = unmasking(theta, wi, surface.tail), unmasking(theta, wo, surface.tail)
+    return 1 / {"height_correlated": i + o - 1, "separable": i * o}[surface.masking]
 
 
 def reflectance(cosine: Array, entries: tuple[Array, ...], kind: str) -> Array:
@@ -103,10 +113,12 @@ def diffuse(entry: Array) -> Array:
     return jnp.exp(entry) / math.pi
 
 
-def specular(theta: Array, wi: Array, wo: Array, wm: Array, surface: Surface) -> Array:
+def specular(theta: Entries, wi: Array, wo: Array, wm: Array, surface: Surface) -> Array:
     """D G2 / (4 cos cos): the specular BRDF [1/sr] of F = 1, which the shape's six entries of θ determine."""
-    D = slope_density(theta, slopes.from_normal(wm), surface.tail) / wm[2] ** 4
-    return bsdf.brdf(wi, wo, D, g2(theta, wi, wo, wm, surface), jnp.ones_like(D))
+    # As `bsdf.brdf` has it; what the directions alone determine is a factor of its own, which no derivative computes again.
+    fixed = 1 / (4 * wi[2] * wo[2] * wm[2] ** 4)
+    slope = (-wm[0] / wm[2], -wm[1] / wm[2])
+    return slope_density(theta, slope, surface.tail) * g2(theta, wi, wo, wm, surface) * fixed
 
 
 def brdf(theta: Array, wi: Array, wo: Array, wm: Array, surface: Surface) -> Array:

@@ -3,9 +3,11 @@ replicate and file. Calls go round the devices, from a thread for each core.
 """
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
-from typing import NamedTuple
+from dataclasses import dataclass, field
+from functools import cache, partial
+from typing import NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -20,6 +22,8 @@ from ggxref.fit.problem import Problem
 
 ROW = 256
 CALL = 16
+
+T = TypeVar("T")
 
 
 class Rows(NamedTuple):
@@ -59,89 +63,181 @@ def join(several: list[Rows]) -> Rows:
 
 
 class Each(NamedTuple):
-    """Of every row: `losses` (r, bands, 256), weighted `scores` (r, p, 256), the summed `hessian` and `bread` (r, p, p).
+    """Of r rows: `weights` (r, 256), `losses` (r, bands, 256), and `factors` (r, bands, 6 + m + 1, 256): the residual's derivatives by
+    the shape and by the band's own m entries, and last the residual r itself, each times the root of weight / √(1 + r²) / bands.
 
-    `hessian` has the weight of each residual in its loss's gradient and is never too small, so that descent is sure;
-    `bread` has the loss's own second derivative. Both leave out the residuals' curvature, whose mean the minimum makes small.
+    What a fit needs are their products, which BLAS forms several times faster than XLA.
     """
 
+    weights: np.ndarray
     losses: np.ndarray
-    scores: np.ndarray
-    hessian: np.ndarray
-    bread: np.ndarray
+    factors: np.ndarray
+
+    @property
+    def loss(self) -> np.ndarray:
+        """(r,): the weighted sums."""
+        return np.einsum("rbn,rn->r", self.losses, self.weights) / self.losses.shape[1]
+
+    def products(self) -> np.ndarray:
+        """(r, bands, 6 + m, 6 + m + 1): of the derivatives with each other, and last with the residual."""
+        return _products(self.factors)
+
+    def terms(self) -> Terms:
+        """The rows' sums: loss, gradient, and the Hessian with each residual's weight in the gradient, so that descent is sure."""
+        return _terms(self.loss, self.products())
+
+    def bread(self) -> np.ndarray:
+        """(r, p, p): the Hessian with the loss's own second derivative. Like `terms`' it leaves out the residuals' curvature,
+        whose mean the minimum makes small.
+        """
+        return _terms(self.loss, _products(self.factors / (1 + self.losses[:, :, None]))).hessian
+
+    def scores(self) -> np.ndarray:
+        """(r, p, 256): each sample's share of the gradient."""
+        size, places = _places(*self.factors.shape[1:3])
+        scores = np.zeros((len(self.weights), size, ROW))
+        for band, place in enumerate(places):
+            scores[:, place] += self.factors[:, band, :-1] * self.factors[:, band, -1:]
+        return scores
 
 
-def _sample(surface: Surface, theta: Array, wi, wo, wm, measured, noise):
-    """Of one sample: the log ratios r (bands,), and their derivatives (bands, 6 + m) by the shape and by a band's own m entries."""
-    shape, own = theta[: len(SHAPE)], theta[len(SHAPE) :].reshape(-1, len(measured)).T
-    cosine = wi[0] * wm[0] + wi[1] * wm[1] + wi[2] * wm[2]
-    # The lobe's derivatives are the same in all bands, and a band's own entries move that band alone: 6 tangents serve all.
-    lobe, tangent = jax.linearize(lambda shape: models.specular(shape, wi, wo, wm, surface), shape)
-    slope = jax.vmap(tangent)(jnp.eye(len(SHAPE), dtype=theta.dtype))
-
-    def band(entries, f):
-        F, dF = jax.value_and_grad(lambda e: models.reflectance(cosine, tuple(e), surface.fresnel))(entries[:-1])
-        base = models.diffuse(entries[-1])
-        radiance = (lobe * F + base) * wo[2] + noise
-        derivative = jnp.concatenate([slope * F, lobe * dF, base[None]])
-        return jnp.log(radiance / (f * wo[2] + noise)), derivative * (wo[2] / radiance)
-
-    return jax.vmap(band)(own, measured)
+def _products(factors: np.ndarray) -> np.ndarray:
+    with np.errstate(all="ignore"):  # a step too far may overflow: the solver refuses it
+        return factors[:, :, :-1] @ factors.swapaxes(-1, -2)
 
 
-# Its results are the fields of Each.
-@partial(jax.jit, static_argnames=("surface",))
-def _call(surface: Surface, theta: Array, samples: tuple[Array, ...], weights: Array) -> tuple[Array, ...]:
+def _places(bands: int, factors: int) -> tuple[int, list[np.ndarray]]:
+    """The size of θ, and where in it each band's derivatives belong, (6 + m,)."""
+    size = len(SHAPE) + bands * (factors - len(SHAPE) - 1)
+    return size, [np.r_[: len(SHAPE), len(SHAPE) + band : size : bands] for band in range(bands)]
+
+
+def _terms(loss: np.ndarray, products: np.ndarray) -> Terms:
+    """From sums of `Each.products`, (…, bands, 6 + m, 6 + m + 1)."""
+    size, places = _places(products.shape[1], products.shape[3])
+    gradient, matrix = np.zeros((len(loss), size)), np.zeros((len(loss), size, size))
+    for band, place in enumerate(places):
+        matrix[:, place[:, None], place] += products[:, band, :, :-1]
+        gradient[:, place] += products[:, band, :, -1]
+    return Terms(loss, gradient, matrix)
+
+
+def _lobe(surface: Surface, shape: tuple[Array, ...], wi, wo, wm) -> tuple[Array, ...]:
+    """The specular BRDF of F = 1 and its derivatives by the six entries of the shape."""
+    lobe, slope = jax.value_and_grad(lambda shape: models.specular(shape, wi, wo, wm, surface))(shape)
+    return lobe, *slope
+
+
+def _band(
+    surface: Surface, entries: tuple[Array, ...], bands: int, f, lobe, cosine, zo, noise, weight
+) -> tuple[Array, ...]:
+    """Of one sample in one band: its loss, the factor of the lobe's derivatives, and the factors of the band's own and of r."""
+    F, dF = jax.value_and_grad(lambda e: models.reflectance(cosine, e, surface.fresnel))(entries[:-1])
+    base = models.diffuse(entries[-1])
+    radiance = (lobe * F + base) * zo + noise
+    r = jnp.log(radiance / (f * zo + noise))
+    s = jnp.sqrt(1 + r * r)
+    root = jnp.sqrt(weight / (s * bands))
+    of_f = root * zo / radiance
+    return r * r / (1 + s), of_f * F, *(of_f * lobe * d for d in dF), of_f * base, root * r
+
+
+# `each` has a thread for each core already.
+@partial(jax.jit, static_argnames=("surface",), compiler_options={"xla_cpu_multi_thread_eigen": False})
+def _call(surface: Surface, theta: Array, samples: tuple[Array, ...], weights: Array) -> tuple:
+    """Of 16 rows: losses, the derivatives of the lobe alone (each 16, 256), and what `_band` says (each 16, bands, 256).
+
+    They leave as they are: to stack them here would compute each of them anew for every place in the stack.
+    """
+
     def row(theta, samples, weights):
-        r, J = jax.vmap(partial(_sample, surface, theta), in_axes=-1, out_axes=-1)(*samples)
-        bands, own = len(r), J.shape[1] - len(SHAPE)
-        s = jnp.sqrt(1 + r * r)
-        losses, scores = r * r / (1 + s), J * (weights * r / s / bands)[:, None]
-        split = scores[:, len(SHAPE) :].swapaxes(0, 1).reshape(own * bands, -1)
-        # Where the entries that a band moves are in θ: (bands, 6 + m, p).
-        place = np.zeros((bands, J.shape[1], len(theta)))
-        for b in range(bands):
-            place[b, range(J.shape[1]), [*range(len(SHAPE)), *(len(SHAPE) + e * bands + b for e in range(own))]] = 1
+        wi, wo, wm, measured, noise = samples
+        own = theta[len(SHAPE) :].reshape(-1, len(measured)).T
+        lobe, *slopes = jax.vmap(partial(_lobe, surface, tuple(theta[: len(SHAPE)])), -1)(wi, wo, wm)
+        cosine = wi[0] * wm[0] + wi[1] * wm[1] + wi[2] * wm[2]
 
-        def matrix(weight):
-            return jnp.einsum("bip,bij,bjq->pq", place, jnp.einsum("bin,bjn->bij", J * weight[:, None], J), place)
+        def band(entries, f):
+            of_sample = partial(_band, surface, tuple(entries), len(measured))
+            return jax.vmap(of_sample)(f, lobe, cosine, wo[2], noise, weights)
 
-        weight = weights / s / bands
-        both = jnp.concatenate([scores[:, : len(SHAPE)].sum(axis=0), split])
-        return losses, both, matrix(weight), matrix(weight / (s * s))
+        return slopes, jax.vmap(band)(own, measured)
 
     return jax.vmap(row)(theta, samples, weights)
 
 
-def each(surface: Surface, theta: np.ndarray, rows: Rows, which: np.ndarray, weights: np.ndarray) -> list[Each]:
-    """The rows with the numbers `which` at θ (r, p) and with `weights` (r, 256), in pieces of 16, the last one cut short."""
-    devices = jax.local_devices()
+def _stacked(slopes: list[np.ndarray], bands: tuple[np.ndarray, ...], size: int) -> tuple[np.ndarray, np.ndarray]:
+    """The losses and the factors of `Each`, of the first `size` rows."""
+    losses, of_lobe, *own = (part[:size] for part in bands)
+    count, number, _ = losses.shape
+    factors = np.empty((count, number, len(slopes) + len(own), ROW))
+    with np.errstate(all="ignore"):
+        for k, slope in enumerate(slopes):
+            np.multiply(slope[:size, None], of_lobe, out=factors[:, :, k])
+    for k, part in enumerate(own, len(slopes)):
+        factors[:, :, k] = part
+    return losses, factors
 
-    def call(number: int) -> Each:
-        part = slice(number * CALL, (number + 1) * CALL)
-        size = len(which[part])
-        # A short call is filled up with its last row: every call has the one compiled shape.
-        fill = np.minimum(np.arange(CALL), size - 1)
-        chosen = which[part][fill]
+
+class Piece(NamedTuple):
+    """16 rows on a device. `numbers`: which of all rows they are. A short piece, of `size` rows, is filled up with its last, so
+    that every call has the one compiled shape.
+    """
+
+    numbers: np.ndarray
+    size: int
+    samples: tuple[Array, ...]
+    weights: Array
+
+
+def pack(rows: Rows, which: np.ndarray, weights: np.ndarray) -> list[Piece]:
+    """The rows with the numbers `which`, with `weights` (r, 256), in pieces that go round the devices."""
+    devices, pieces = jax.local_devices(), []
+    for number, start in enumerate(range(0, len(which), CALL)):
+        numbers = np.minimum(np.arange(start, start + CALL), len(which) - 1)
+        samples = tuple(a[which[numbers]] for a in rows.samples)
+        with solver.float64():
+            there = jax.device_put((samples, weights[numbers]), devices[number % len(devices)])
+        pieces.append(Piece(numbers, min(CALL, len(which) - start), *there))
+    return pieces
+
+
+def each(surface: Surface, theta: np.ndarray, pieces: list[Piece], of: Callable[[Each], T]) -> list[T]:
+    """What `of` makes of each piece's rows at their θ (r, p)."""
+
+    def call(piece: Piece) -> T:
         # The configuration belongs to a thread.
-        with solver.float64(), jax.default_device(devices[number % len(devices)]):
-            found = _call(surface, theta[part][fill], tuple(a[chosen] for a in rows.samples), weights[part][fill])
-            return Each(*(np.asarray(array)[:size] for array in found))
+        with solver.float64():
+            found = _call(surface, theta[piece.numbers], piece.samples, piece.weights)
+            slopes, bands = jax.tree.map(np.asarray, found)
+            losses, factors = _stacked(slopes, bands, piece.size)
+            return of(Each(np.asarray(piece.weights)[: piece.size], losses, factors))
 
-    count = -(-len(which) // CALL)
-    if count == 1:
-        return [call(0)]
-    with ThreadPoolExecutor(max(os.cpu_count() or 1, len(devices))) as pool:
-        return list(pool.map(call, range(count)))
+    if len(pieces) == 1 or _workers() == 1:
+        return [call(piece) for piece in pieces]
+    return list(_threads().map(call, pieces))
 
 
-class Lanes(NamedTuple):
+def _workers() -> int:
+    """A thread for each core that this process may use, or for each device."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(cores, len(jax.local_devices()))
+
+
+@cache
+def _threads() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(_workers())
+
+
+@dataclass
+class Lanes:
     """Problems to solve side by side. `which`: of each lane, the numbers of its rows; `weights`: those rows', (rows, 256)."""
 
     surface: Surface
     rows: Rows
     which: list[np.ndarray]
     weights: list[np.ndarray]
+    packed: tuple[np.ndarray, list[Piece]] = field(default_factory=lambda: (np.zeros(0, int), []))
+    """The lanes asked for last, which mostly are asked for again, and their rows."""
 
     @property
     def total(self) -> np.ndarray:
@@ -154,12 +250,10 @@ class Lanes(NamedTuple):
     def terms(self, theta: np.ndarray, lanes: np.ndarray) -> Terms:
         """The mean loss of these lanes, its gradient and the matrix like its Hessian."""
         owner = np.repeat(np.arange(len(lanes)), [len(self.which[k]) for k in lanes])
-        which = np.concatenate([self.which[k] for k in lanes])
-        weights = np.concatenate([self.weights[k] for k in lanes])
-        pieces = each(self.surface, theta[owner], self.rows, which, weights)
-        loss = np.concatenate([piece.losses.mean(axis=1) for piece in pieces])
-        sums = (loss * weights).sum(axis=1), *(np.concatenate(list(part)) for part in zip(
-            *((piece.scores.sum(axis=-1), piece.hessian) for piece in pieces), strict=True))  # fmt: skip
-        starts = np.searchsorted(owner, np.arange(len(lanes)))
-        total = self.total[lanes]
-        return Terms(*(np.add.reduceat(s, starts) / total.reshape(-1, *[1] * (s.ndim - 1)) for s in sums))
+        if not np.array_equal(lanes, self.packed[0]):
+            which, weights = (np.concatenate([part[k] for k in lanes]) for part in (self.which, self.weights))
+            self.packed = lanes, pack(self.rows, which, weights)
+        pieces = each(self.surface, theta[owner], self.packed[1], lambda each: (each.loss, each.products()))
+        starts, total = np.searchsorted(owner, np.arange(len(lanes))), self.total[lanes]
+        sums = [np.add.reduceat(np.concatenate(parts), starts) for parts in zip(*pieces, strict=True)]
+        return _terms(*(part / total.reshape(-1, *[1] * (part.ndim - 1)) for part in sums))
