@@ -10,6 +10,7 @@ from io import BytesIO, StringIO
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
 from ggxref.measure.tables import Rows
 from ggxref.measure.variants import QUANTITIES
@@ -103,7 +104,7 @@ def front(rows: Rows) -> Rows:
 def pareto(rows: Rows, caption: str) -> Figure:
     """Error against time for every form of every quantity, the front drawn."""
     names = _unique(rows, "quantity")
-    figure, axes = plt.subplots(2, -(-len(names) // 2), figsize=(13, 8.4), layout="constrained")
+    figure, axes = plt.subplots(3, -(-len(names) // 3), figsize=(12.5, 12), layout="constrained")
     for ax, name in zip(axes.flat, names, strict=False):
         mine = [r for r in rows if r["quantity"] == name]
         edge = front(mine)
@@ -122,7 +123,10 @@ def pareto(rows: Rows, caption: str) -> Figure:
         ax.set_title(QUANTITIES[name].label)
         low, high = min(r["ns"] for r in mine), max(r["ns"] for r in mine)
         ax.set_xlim(low / 1.6, high * 1.6)
-        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False, fontsize=6.5, ncol=2)
+        ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 20 * low else (1,)))
+        ax.xaxis.set_major_formatter("{x:g}")
+        ax.xaxis.set_minor_formatter("")
+        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False, fontsize=6.5, ncol=2, columnspacing=1)
         ax.grid(True, which="major", lw=0.3, color="0.85")
     for ax in list(axes.flat)[len(names) :]:
         ax.set_axis_off()

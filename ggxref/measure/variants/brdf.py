@@ -31,7 +31,7 @@ def one_expression(wi, wo, alpha):
     return bsdf.brdf_ggx(wi, wo, alpha) * fresnel.conductor(cosine, ETA, K)
 
 
-def composed(wi, wo, alpha, half=geometry.half_reflection):
+def composed(wi, wo, alpha, *, half=geometry.half_reflection):
     """D, G1, G2 and F of the library, put together."""
     wm = half(wi, wo)
     G2 = masking.g2_height_correlated(masking.g1_ggx(wi, wm, alpha), masking.g1_ggx(wo, wm, alpha))
@@ -41,7 +41,7 @@ def composed(wi, wo, alpha, half=geometry.half_reflection):
 
 def composed_plain(wi, wo, alpha):
     """The same at the plain half vector."""
-    return composed(wi, wo, alpha, half_plain)
+    return composed(wi, wo, alpha, half=half_plain)
 
 
 def plain(wi, wo, alpha):
