@@ -1,6 +1,6 @@
 """Do fits of synthetic data find what made them, do their intervals hold it 95 times in 100, and is the right model chosen?
 
-    python experiments/fit_recovery.py intervals --trials 1000 --seed 201 --page docs/fitting.md
+    python experiments/fit_recovery.py intervals --trials 600 --seed 501 --page docs/fitting.md
     python experiments/fit_recovery.py choice --trials 100 --seed 302 --page docs/fitting.md
     python experiments/fit_recovery.py skew --trials 60 --seed 303 --page docs/fitting.md
 

@@ -56,6 +56,27 @@ def test_slope_density_is_the_librarys():
 
 
 @pytest.mark.parametrize("tail", parameters.TAILS)
+def test_the_standard_densities_and_areas_are_the_librarys(tail):
+    """At α = 1 with no mean, for γ = 3; from directions above the horizon, as of the others G1 is 1."""
+    theta = np.r_[np.zeros(5), np.log(1.5), 0.0, 0.0]
+    points = np.random.default_rng(2).normal(scale=2.0, size=(2, 50))
+    wi, _, _ = directions(fit_data.angles()[::7])
+    density = {"ggx": slopes.ggx, "beckmann": slopes.beckmann, "student_t": lambda s, a: slopes.student_t(s, a, 3.0)}
+    area = {
+        "ggx": slopes.sigma_ggx,
+        "beckmann": slopes.sigma_beckmann,
+        "student_t": lambda w, _: student.sigma(w, jnp.asarray(3.0)),
+    }
+    with solver.float64():
+        expected = jax.vmap(density[tail], (-1, None))(jnp.asarray(points), jnp.ones(2))
+        found = models.slope_densities(theta, points, tail)
+        seen = jax.vmap(area[tail], (-1, None))(jnp.asarray(wi), jnp.ones(2))
+        unmasked = jax.vmap(models.unmasking, (None, -1, None))(jnp.asarray(theta), jnp.asarray(wi), tail)
+    assert_allclose(found, expected, rtol=SAME)
+    assert_allclose(unmasked, np.asarray(seen) / wi[2], rtol=SAME)
+
+
+@pytest.mark.parametrize("tail", parameters.TAILS)
 def test_the_logarithm_of_the_density(tail):
     near, far = np.random.default_rng(2).normal(scale=0.3, size=(2, 50)), np.full((2, 1), 30.0)
     with solver.float64():

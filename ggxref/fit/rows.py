@@ -106,6 +106,7 @@ def _products(factors: np.ndarray) -> np.ndarray:
         return factors[:, :, :-1] @ factors.swapaxes(-1, -2)
 
 
+@cache
 def _places(bands: int, factors: int) -> tuple[int, list[np.ndarray]]:
     """The size of θ, and where in it each band's derivatives belong, (6 + m,)."""
     size = len(SHAPE) + bands * (factors - len(SHAPE) - 1)
