@@ -93,7 +93,7 @@ def pair(scene: Scene, found: dict, region: np.ndarray, samples: int, turn: int)
 
 
 def independent(scene: Scene, found: dict, region: np.ndarray, expected: float, tolerance: float, most: int) -> Anew:
-    """With as many samples as a deviation of the `expected` size needs to be told from the tolerance, at most `most` in all."""
+    """With as many samples as a deviation as large as `expected` needs to be told from the tolerance, at most `most` in all."""
     pilot = pair(scene, found, region, PILOT, 0)
     # The square's error, from the root's (`compare.deviation`), falls as the samples rise.
     error = ((pilot.value + compare.SURE * pilot.error) ** 2 - pilot.value**2) / compare.SURE
@@ -134,7 +134,8 @@ def main() -> int:
         for material, region in regions.items():
             each = found["materials"][material]
             expected = each["deviation"]["value"]
-            anew = independent(scene, found, region, expected, arguments.tolerance, arguments.most)
+            largest = expected + 2 * each["deviation"]["standard_error"]
+            anew = independent(scene, found, region, largest, arguments.tolerance, arguments.most)
             good &= holds(each, anew.deviation, arguments.tolerance)
             keys = [key for key in each["richest"] if each["chosen"][key] != each["richest"][key]]
             changed = ", ".join(each["chosen"][key] for key in keys) or "-"

@@ -2,7 +2,6 @@
 
 from ggxref.measure.charts import front
 from ggxref.measure.tables import Rows
-from ggxref.measure.variants import QUANTITIES
 
 DTYPES = {"f64": 2.0**-29, "f32": 1.0, "f16": 2.0**13, "bf16": 2.0**16}
 
@@ -21,8 +20,7 @@ def table(rows: Rows) -> str:
         good = [r for r in front(single) if r["worst"] <= 16]
         other = ", ".join(f"{r['dtype']} {r['worst'] / DTYPES[r['dtype']]:.3g}" for r in mine if r["dtype"] != "f32")
         fast = f"{good[0]['variant']} ({good[0]['ns']:.2g} ns)" if good else "none"
-        label = QUANTITIES[name].label.replace("$", "")
         lines.append(
-            f"| {name} ({label}) | {best['variant']} ({best['worst']:.3g} ULP, {best['ns']:.2g} ns) | {fast} | {other} |"
+            f"| {name} | {best['variant']} ({best['worst']:.3g} ULP, {best['ns']:.2g} ns) | {fast} | {other} |"
         )
     return "\n".join(lines) + "\n"
