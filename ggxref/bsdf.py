@@ -38,8 +38,15 @@ def brdf_ggx(wi: Vec3, wo: Vec3, alpha: Vec2) -> Scalar:
     normalised, and no digit is lost where $\omega_o$ is nearly $-\omega_i$. A third of the composition's time.
     """
     x, y, z = stable.unit_sum(wi, wo)
-    seen = (wi[2] > 0) & (wo[2] > 0)
-    square = jnp.where(seen, x * x + y * y + z * z, 1)
+    # The quotient q knows no length of h, but near the horizon its squares may underflow.
+    info = jnp.finfo(x.dtype)
+    scale = jnp.where(
+        jnp.maximum(jnp.maximum(abs(x), abs(y)), z) < 2.0 ** (info.minexp // 4), 2.0 ** -(info.minexp // 2), 1
+    )
+    x, y, z = x * scale, y * scale, z * scale
+    square = x * x + y * y + z * z
+    seen = (wi[2] > 0) & (wo[2] > 0) & (square > 0)
+    square = jnp.where(seen, square, 1)
     q = jnp.where(seen, ((x / alpha[0]) ** 2 + (y / alpha[1]) ** 2 + z * z) / square, 1)
     length_i, length_o = (length(alpha[0] * w[0], alpha[1] * w[1], w[2]) for w in (wi, wo))
     between = jnp.where(seen, wo[2] * length_i + wi[2] * length_o, 1)

@@ -208,3 +208,11 @@ def test_half_precision_is_finite_where_the_value_is(name, half, table):
     keep = np.all(np.abs(exact) < OVERFLOWS * float(info.max), axis=1)
     rows = numbers(over_rows(public(name), inputs))[keep]
     assert np.all(np.isfinite(rows)), shown(rows, {a: x[keep] for a, x in inputs.items()})
+
+
+@pytest.mark.parametrize("height", [1e-12, 1e-25, 1e-36])
+def test_brdf_of_opposite_directions_does_not_underflow(height):
+    """h = (0, 0, 2z), whose square is below float32's range: D of the normal, G2 and 1/(4 z²) give 1/(4π αx² αy z), about."""
+    wi, wo = (jnp.asarray([x, 0, height], jnp.float32) for x in (1, -1))
+    found = public("bsdf.brdf_ggx")(wi, wo, jnp.asarray([0.5, 0.25], jnp.float32))
+    np.testing.assert_allclose(found, 1 / (4 * np.pi * 0.5**2 * 0.25 * float(wi[2])), rtol=1e-6)

@@ -260,10 +260,45 @@ def test_bad_usage_ends_with_2(arguments, message):
 @pytest.mark.parametrize("options", [[], ["--quick"]])
 def test_the_library_passes_as_compiled(options):
     """A slice, of values and gradients in all dtypes; the whole set takes a minute (docs/vectors.md)."""
-    asked = ["--functions", "fresnel,masking.lambda_ggx,ndf.ggx.d_alpha", "--python", "ggxref", "--jax", *options]
+    asked = [
+        "--functions",
+        "fresnel,masking.lambda_ggx,ndf.ggx.d_alpha,ndf.ggx.d_wm",
+        "--python",
+        "ggxref",
+        "--jax",
+        *options,
+    ]
     result = run(app, ["grade", *asked])
     assert result.exit_code == 0, result.output
     assert re.search(r"passed: (\d+) of \1 tests pass", result.output)
+
+
+def test_names_of_one_callable_are_answered_together(tmp_path, monkeypatch):
+    """A callable without a hash under two names, and one of its derivatives alone at fault: the other one passes."""
+    (tmp_path / "made_up_twins.py").write_text(
+        "import jax\nfrom ggxref import ndf\n"
+        "class Unhashable:\n"
+        "    def __eq__(self, other): return True\n"
+        "    def __call__(self, wm, alpha): return ndf.ggx(wm, alpha)\n"
+        "ggx = Unhashable()\n"
+        "@jax.custom_vjp\n"
+        "def opaque(alpha): return alpha\n"
+        "def backward(_, change): raise TypeError('opaque')\n"
+        "opaque.defvjp(lambda alpha: (alpha, None), backward)\n"
+        "def half(wm, alpha): return ndf.ggx(wm, opaque(alpha))\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    whole = tmp_path / "whole.json"
+    whole.write_text(json.dumps({"ndf.ggx": "made_up_twins:ggx", "sampling.normals.pdf_ggx": "made_up_twins:ggx"}))
+    asked = ["grade", "--functions", "ndf.ggx,ndf.ggx.d_wm,ndf.ggx.d_alpha,sampling.normals.pdf_ggx", "--dtypes", "f32"]
+    output = run(app, [*asked, "--map", str(whole), "--jax"]).output
+    for name in ("ndf.ggx", "ndf.ggx.d_wm", "ndf.ggx.d_alpha"):
+        assert re.search(rf"{re.escape(name)} f32 +(\d+) +\1 ", output), output
+    assert not re.search(r"pdf_ggx f32 +(\d+) +\1 ", output)  # D is not D cos
+    whole.write_text(json.dumps({"ndf.ggx": "made_up_twins:half"}))
+    output = run(app, [*asked, "--map", str(whole), "--jax"]).output
+    assert re.search(r"ndf.ggx.d_wm f32 +(\d+) +\1 ", output), output
+    assert re.search(r"ndf.ggx.d_alpha f32 .*TypeError: opaque", output), output
 
 
 def test_functions_that_end_their_process_are_reported(tmp_path, monkeypatch):

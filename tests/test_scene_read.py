@@ -49,6 +49,7 @@ def test_reads_what_is_written(tmp_path):
 
 BAD = {
     "unknown key": ("radius = 1\n", "radius = 1\ncolour = 3\n", ["shapes[0].colour", "not a known key", "center"]),
+    "misspelt list": ("[[shapes]]", "[[shape]]", ["shape", "not a known key", "shapes"]),
     "misspelt table": ("[view]", "[veiw]", ["veiw", "not a known key", "view"]),
     "unknown table": ("[view]", "[views]\na = 1\n[view]", ["views", "not a known key"]),
     "alpha zero": ("[0.1, 0.4]", "0.0", ["materials.metal.alpha", "0.0", "positive"]),

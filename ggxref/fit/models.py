@@ -88,11 +88,6 @@ def unmasking(theta: Entries, w: Array, tail: str) -> Array:
     return jnp.maximum(1, AREA[tail]((x, y, z), theta) * (1 / w[2]))
 
 
-def g1(theta: Entries, w: Array, tail: str) -> Array:
-    """Smith's G1 for `w`, (3,), above the horizon and micronormals that it sees."""
-    return 1 / unmasking(theta, w, tail)
-
-
 def g2(theta: Entries, wi: Array, wo: Array, wm: Array, surface: Surface) -> Array:
     """G2 for reflection. V-cavities know no α: their cavities are symmetrical about n, whatever the slopes' mean."""
     if surface.masking == "v_cavity":

@@ -5,13 +5,11 @@ their mean length, and with it the area of the surface, becomes infinite, and no
 """
 
 import math
-from functools import partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from jax.custom_derivatives import SymbolicZero
 from numpy.polynomial import chebyshev, polynomial
 
 TERMS = 34
@@ -65,13 +63,10 @@ def sine_integral(sine: Array, cosine: Array, nu: Array) -> Array:
     return _series(sine, cosine, nu)
 
 
-@partial(sine_integral.defjvp, symbolic_zeros=True)
+@sine_integral.defjvp
 def _sine_integral_jvp(primals, tangents):
     (sine, cosine, nu), (d_sine, d_cosine, d_nu) = primals, tangents
-    d_sine, d_cosine = (jnp.zeros_like(sine) if isinstance(d, SymbolicZero) else d for d in (d_sine, d_cosine))
     along = sine ** (nu - 1) * (cosine * d_sine - sine * d_cosine)
-    if isinstance(d_nu, SymbolicZero):  # of six parameters only γ moves ν, at the cost of the series' derivative
-        return sine_integral(sine, cosine, nu), along
     value, by_nu = jax.jvp(lambda nu: _series(sine, cosine, nu), (nu,), (jnp.ones_like(nu),))
     return value, along + by_nu * d_nu
 

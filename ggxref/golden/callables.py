@@ -125,11 +125,13 @@ def nested(x: Any) -> Any:
 def together(implementation: Implementation, tests: list[Test]) -> list[list[Test]]:
     """Tests by what answers them, without those that nothing does: a callable under several names is compiled once,
     as are all its derivatives."""
-    found = {t.function.id: implementation.find(t.function) for t in tests}
+    found = {id: implementation.find(function) for id, function in {t.function.id: t.function for t in tests}.items()}
     jobs: dict[Any, list[Test]] = defaultdict(list)
     for t in tests:
         if f := found[t.function.id]:
-            jobs[f if implementation.jax else t.function.id, frozenset(t.inputs), t.fmt.name].append(t)
+            # By identity: somebody's callable need not have a hash.
+            same = (id(f.function), f.options, f.differentiate) if implementation.jax else t.function.id
+            jobs[same, frozenset(t.function.arguments.items()), t.fmt.name].append(t)
     return list(jobs.values())
 
 
@@ -202,4 +204,8 @@ def compiled(f: Found, tests: list[Test], quick: bool) -> list[Any]:
             result = jax.tree.map(np.asarray, jax.jit(jax.vmap(point), compiler_options=options)(inputs))
             return [answer(result, i) for i in range(len(tests))]
     except Exception as error:  # whatever somebody's code raises is its answer
-        return [Failure(f"{type(error).__name__}: {error}"[:200])] * len(tests)
+        if len(by) == 1 or not by:
+            return [Failure(f"{type(error).__name__}: {error}"[:200])] * len(tests)
+        # One derivative that fails must not fail the others.
+        parts = {a: iter(compiled(f, [t for t in tests if t.function.derivative == a], quick)) for a in by}
+        return [next(parts[t.function.derivative]) for t in tests]

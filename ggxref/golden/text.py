@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator
 from itertools import groupby
 from typing import Any
 
+from ggxref.errors import InputError
 from ggxref.golden import schema
 from ggxref.golden.cases import leaves
 from ggxref.golden.catalogue import Function
@@ -46,7 +47,10 @@ def groups(tests: Iterable[Test]) -> Iterator[tuple[Function, Format, list[Test]
 
 def like(tests: list[Test]) -> Any:
     """The nesting of the group's results."""
-    return next(t.result.expected for t in tests if t.result)
+    for t in tests:
+        if t.result:
+            return t.result.expected
+    raise InputError(f"{tests[0].function.id}: tests of broken inputs alone; none tells what a result looks like")
 
 
 def header(function: Function, fmt: Format, tests: list[Test], outputs: int) -> str:

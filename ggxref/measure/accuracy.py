@@ -158,7 +158,7 @@ def errors(run: Callable, reference: Callable, args, dtype) -> tuple[np.ndarray,
     size = np.abs(truth.hi)
     scalar = truth.hi.ndim == 1
     faint = (np.maximum(size, np.abs(computed)) < FAINTEST) & (computed != truth.hi) & scalar
-    graded = np.isfinite(truth.hi) & (size <= float(info.max)) & ~faint
+    graded = np.isfinite(truth.hi) & (size <= float(info.max))
     nan, inf = np.isnan(computed) & graded, np.isinf(computed) & graded
     zero = (computed == 0) & (size >= float(info.smallest_normal)) & graded & scalar
     sign = (computed * truth.hi < 0) & graded & scalar
@@ -166,7 +166,7 @@ def errors(run: Callable, reference: Callable, args, dtype) -> tuple[np.ndarray,
         error = in_units((computed - truth.hi) - truth.lo, truth.hi, dtype)
     flushed = (computed == 0) & (size > 0) & (size < float(info.smallest_normal)) & scalar
     flat = [f if scalar else f.any(0) for f in (nan, inf, zero, sign, flushed)]
-    graded = graded & ~flushed if scalar else graded.all(0)
+    graded = graded & ~flushed & ~faint if scalar else graded.all(0)
     error = np.where(flat[0] | flat[1], np.inf, error)
     return error, graded, Faults(*(int(f.sum()) for f in flat))
 

@@ -172,7 +172,6 @@ _LIGHTS: dict[str, dict[str, Callable[[Table, str], Any]]] = {
 
 
 def _list(root: Table, key: str) -> list[Table]:
-    root.asked.add(key)
     values = root.values.get(key, [])
     if not isinstance(values, list) or not values:
         raise InputError(f"{root.path}: no [[{key}]]; a picture needs at least one")
@@ -222,8 +221,9 @@ def read(path: Path) -> Scene:
     root = Table(path, "", values)
     title = root.take("title", text(), path.stem)
     budget, view, materials = (root.table(key) for key in ("budget", "view", "materials"))
-    shapes, lights = _list(root, "shapes"), _list(root, "lights")
+    root.asked |= {"shapes", "lights"}
     root.close()  # before what is in them: a [veiw] is better named than the origin that [view] lacks
+    shapes, lights = _list(root, "shapes"), _list(root, "lights")
     if budget.has("samples") and budget.has("seconds"):
         raise budget.bad("seconds", "with samples beside it; need one of the two")
     seconds = budget.take("seconds", number(0, 1e5, above=True), 0.0)

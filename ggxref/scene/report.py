@@ -240,7 +240,7 @@ _SIZE = 6.0
 
 def _label(panel: Axes, labels: dict[tuple[float, float], list[str]]) -> None:
     """Each point's options beside it, where the panel, the marks and the labels before leave room."""
-    points = 72 / panel.get_figure(root=True).dpi  # pyright: ignore[reportOptionalMemberAccess]
+    points = 72 / panel.figure.dpi
     inside = np.array(panel.bbox.extents) * points
     at = {key: panel.transData.transform(key) * points for key in labels}
     taken = [np.array([x - 3, y - 3, x + 3, y + 3]) for x, y in at.values()]

@@ -86,7 +86,10 @@ def _kernel(integrand, about, numbers, points, devices):
 
 
 def _random(seed, index, numbers):
-    """SplitMix64 (Steele, Lea & Flood 2014, which passes BigCrush) of the number of a pair: two numbers of 24 bits."""
+    """SplitMix64 (Steele, Lea & Flood 2014, which passes BigCrush) of the number of a pair: two numbers of 24 bits.
+
+    A seed owns 2³² pairs; beyond them come the next seed's.
+    """
     pairs = -(-numbers // 2)
     place = jnp.arange(pairs * BLOCK, dtype=jnp.uint64) + index.astype(jnp.uint64) * jnp.uint64(pairs * BLOCK)
     z = (place + (seed.astype(jnp.uint64) << 32)) * jnp.uint64(0x9E3779B97F4A7C15)
