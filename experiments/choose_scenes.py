@@ -2,12 +2,13 @@
 
     python experiments/choose_scenes.py [--tolerance 0.01] [--most 134217728] [--scenes brushed glass] [--out docs/figures]
 
-Each scene is searched by the command in a process of its own, timed from outside. Then each material is rendered anew, the
-richest and the chosen, in a picture of the box round its pixels: each with its own seed and all of its formulas (the chosen
-sampler, the stored precision). Their deviation is estimated as `choose` does it, but that no random number is shared: its
-error is larger, and nothing that `choose` relied on is relied on. A first picture tells how many samples resolve the
-tolerance; a second one, of other seeds and that many, tells the deviation. At tolerance 0 the richest models must be
-chosen. Exit code 1 if a claim does not hold: a deviation that two errors leave above the tolerance.
+Each scene is searched by the command in a process of its own, timed from outside. Then each material is rendered
+anew, the richest and the chosen, in a picture of the box round its pixels: each with its own seed and all of its
+formulas (the chosen sampler, the stored precision). Their deviation is estimated as `choose` does it, but that no
+random number is shared: its error is larger, and nothing that `choose` relied on is relied on. A first picture tells
+how many samples resolve the tolerance; a second one, of other seeds and that many, tells the deviation, or else a
+third one, of four times as many. At tolerance 0 the richest models must be chosen. Exit code 1 if a claim does not
+hold: a deviation that two errors leave above the tolerance.
 """
 
 import argparse
@@ -29,7 +30,7 @@ from ggxref.scene.read import Scene, read
 from ggxref.scene.search import AXES, COUNT
 
 SCENES = Path(__file__).parent / "scenes"
-SEEDS = {"richest": (1001, 1003), "chosen": (2002, 2004)}
+SEEDS = {"richest": (1001, 1003, 1005), "chosen": (2002, 2004, 2006)}
 PILOT = 512
 """Samples a pixel that tell how many are needed."""
 CLEAR = 5
@@ -100,8 +101,13 @@ def independent(scene: Scene, found: dict, region: np.ndarray, expected: float, 
     room = max(tolerance**2 - expected**2, 0.1 * tolerance**2)
     wanted = PILOT * (CLEAR * error / room if tolerance else 4)
     pixels = np.prod([each.stop - each.start for each in box(region)])
-    samples = int(min(max(wanted, 4 * PILOT), most / pixels)) // COUNT * COUNT
-    return Anew(pair(scene, found, region, samples, 1), samples)
+    for turn in (1, 2):
+        samples = int(min(max(wanted, 4 * PILOT), most / pixels)) // COUNT * COUNT
+        deviation = pair(scene, found, region, samples, turn)
+        if not tolerance or not deviation.least <= tolerance <= deviation.most:
+            break
+        wanted = 4 * samples  # the pilot had promised too much: once more, anew
+    return Anew(deviation, samples)
 
 
 def percent(value: float, error: float) -> str:
