@@ -139,13 +139,12 @@ def main() -> int:
         faster = f"{found['faster']:.2f} ± {found['faster_standard_error']:.2f}"
         for material, region in regions.items():
             each = found["materials"][material]
-            expected = each["deviation"]["value"]
-            largest = expected + 2 * each["deviation"]["standard_error"]
-            anew = independent(scene, found, region, largest, arguments.tolerance, arguments.most)
+            expected = Deviation(each["deviation"]["value"], each["deviation"]["standard_error"])
+            anew = independent(scene, found, region, expected.most, arguments.tolerance, arguments.most)
             good &= holds(each, anew.deviation, arguments.tolerance)
             keys = [key for key in each["richest"] if each["chosen"][key] != each["richest"][key]]
             changed = ", ".join(each["chosen"][key] for key in keys) or "-"
-            by_choose = percent(expected, each["deviation"]["standard_error"])
+            by_choose = percent(expected.value, expected.error)
             again = percent(anew.deviation.value, anew.deviation.error)
             cells = *first, material, changed, by_choose, again, str(anew.samples), faster
             print("| " + " | ".join(cells) + " |", flush=True)

@@ -66,9 +66,8 @@ def sine_integral(sine: Array, cosine: Array, nu: Array) -> Array:
 @sine_integral.defjvp
 def _sine_integral_jvp(primals, tangents):
     (sine, cosine, nu), (d_sine, d_cosine, d_nu) = primals, tangents
-    along = sine ** (nu - 1) * (cosine * d_sine - sine * d_cosine)
     value, by_nu = jax.jvp(lambda nu: _series(sine, cosine, nu), (nu,), (jnp.ones_like(nu),))
-    return value, along + by_nu * d_nu
+    return value, sine ** (nu - 1) * (cosine * d_sine - sine * d_cosine) + by_nu * d_nu
 
 
 def sigma(w: Array | tuple[Array, Array, Array], gamma: Array) -> Array:

@@ -125,7 +125,8 @@ def nested(x: Any) -> Any:
 def together(implementation: Implementation, tests: list[Test]) -> list[list[Test]]:
     """Tests by what answers them, without those that nothing does: a callable under several names is compiled once,
     as are all its derivatives."""
-    found = {id: implementation.find(function) for id, function in {t.function.id: t.function for t in tests}.items()}
+    functions = {t.function.id: t.function for t in tests}
+    found = {name: implementation.find(function) for name, function in functions.items()}
     jobs: dict[Any, list[Test]] = defaultdict(list)
     for t in tests:
         if f := found[t.function.id]:
@@ -204,7 +205,7 @@ def compiled(f: Found, tests: list[Test], quick: bool) -> list[Any]:
             result = jax.tree.map(np.asarray, jax.jit(jax.vmap(point), compiler_options=options)(inputs))
             return [answer(result, i) for i in range(len(tests))]
     except Exception as error:  # whatever somebody's code raises is its answer
-        if len(by) == 1 or not by:
+        if len(by) < 2:
             return [Failure(f"{type(error).__name__}: {error}"[:200])] * len(tests)
         # One derivative that fails must not fail the others.
         parts = {a: iter(compiled(f, [t for t in tests if t.function.derivative == a], quick)) for a in by}

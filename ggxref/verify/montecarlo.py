@@ -73,8 +73,7 @@ def _kernel(integrand, about, numbers, points, devices):
         # Rows: the order of additions is fixed, and short sums lose few digits.
         rows = (jax.vmap(integrand, in_axes=-1)(u) - jnp.float32(about)).reshape(-1, 128)
         # Two sums apart: for an array that holds both terms XLA computes the integrand twice, a number at a time.
-        parts = (jnp.sum(x, axis=-1, dtype=jnp.float64).sum() for x in (rows, rows * rows))
-        return jnp.stack([*parts])
+        return jnp.stack([jnp.sum(x, axis=-1, dtype=jnp.float64).sum() for x in (rows, rows * rows)])
 
     def blocks(index, seed):
         # Not a loop: XLA's kernels within one are slower by a half.

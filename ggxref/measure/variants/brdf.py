@@ -6,6 +6,7 @@ import jax.numpy as jnp
 
 from ggxref import bsdf, fresnel, geometry, masking, ndf, stable
 from ggxref.measure import reference
+from ggxref.measure.variants.densities import exact_dot
 from ggxref.measure.variants.form import Variant
 
 # Nearly silver at 550 nm, in numbers that every dtype holds: index and extinction.
@@ -15,8 +16,7 @@ exact_half = reference.geometry_half_reflection
 
 
 def exact_brdf(wi, wo, alpha):
-    i, wm = reference.unit(wi), exact_half(wi, wo)
-    F = reference.fresnel_conductor(i[0] * wm[0] + i[1] * wm[1] + i[2] * wm[2], ETA, K)
+    F = reference.fresnel_conductor(exact_dot(reference.unit(wi), exact_half(wi, wo)), ETA, K)
     return reference.bsdf_brdf_ggx(wi, wo, alpha) * F
 
 
