@@ -31,8 +31,8 @@ def refract(w: Vec3, wm: Vec3, eta: Real) -> Vec3:
     square = (1 - eta) * (1 + eta) + (eta * c) ** 2
     root = stable.sqrt(square)
     along = jnp.where(c > 0, eta * c - root, eta * c + root)
-    # A component at a time, here and below: a `where` of vectors under `vmap` puts the points first, which costs strides.
-    return jnp.stack([jnp.where(square >= 0, along * m - eta * x, 0) for x, m in zip(w, wm, strict=True)])
+    x, y, z = (jnp.where(square >= 0, along * m - eta * x, 0) for x, m in zip(w, wm, strict=True))
+    return jnp.stack(stable.one_loop(x, y, z))
 
 
 def half_reflection(wi: Vec3, wo: Vec3) -> Vec3:
@@ -55,7 +55,7 @@ def half_refraction(wi: Vec3, wo: Vec3, n_i: Real, n_o: Real) -> Vec3:
     Walter et al. 2007 (16), used by heitz2014 §2.1.
     """
     wm = stable.direction(*stable.weighted_sum(wi, wo, n_i, n_o))
-    return jnp.stack([jnp.where(wm[2] < 0, -x, x) for x in wm])
+    return stable.either(wm[2] < 0, -wm, wm)
 
 
 def basis(w: Vec3) -> Mat3:

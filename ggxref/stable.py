@@ -11,7 +11,7 @@ from collections.abc import Callable
 import jax
 import jax.numpy as jnp
 from jax import Array, lax
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ggxref._types import Real, Scalar, Vec2, Vec3
 
@@ -250,14 +250,33 @@ def unit(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     return x * scale, y * scale, z * scale
 
 
+@jax.custom_jvp
+def one_loop(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """The components as they are, all computed in the same pass over the points.
+
+    XLA's loops on a CPU have one result each, so that components repeat what they share, or wait for it in memory; only
+    a reduction may have several. Hence each becomes the larger of itself and -inf.
+    """
+    lowest = jnp.asarray(-jnp.inf, x.dtype)
+    rows = [lax.pad(c[None], lowest, [(0, 1, 0)] + [(0, 0, 0)] * c.ndim) for c in jnp.broadcast_arrays(x, y, z)]
+    x, y, z = lax.reduce(rows, [lowest] * 3, lambda a, b: [lax.max(p, q) for p, q in zip(a, b, strict=True)], [0])
+    return x, y, z
+
+
+@one_loop.defjvp
+def _one_loop_jvp(primals, tangents):
+    return one_loop(*primals), tangents
+
+
 @widened
 def direction(x: Scalar, y: Scalar, z: Scalar) -> Vec3:
     """`unit` as one array (3,): what a sampler ends with."""
-    # Without the barrier XLA fuses the three components into the result, and computes each of them once for itself and
-    # again for the norm: half as much time again.
-    v = lax.optimization_barrier(jnp.stack([x, y, z]))
-    square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
-    return v / jnp.sqrt(jnp.where(square > 0, square, 1))
+    return jnp.stack(unit(*one_loop(x, y, z)))
+
+
+def either(condition: Bool[Array, ""], one: Vec3, other: Vec3) -> Vec3:
+    """`where` of vectors, a component at a time: of whole ones under `vmap` it puts the points first, which costs strides."""
+    return jnp.stack([jnp.where(condition, x, y) for x, y in zip(one, other, strict=True)])
 
 
 @widened

@@ -63,6 +63,22 @@ def copy(args: list) -> Callable[[], object]:
     return lambda: [a.copy() for a in flat]
 
 
+SETTLE = 0.01
+"""Seconds: ten times the call that a kernel makes at 2^18 points."""
+
+
+def _turn(call: Callable[[], object]) -> list[float]:
+    """Seconds of each call of a turn, which lasts as long again as the subject had to settle."""
+    taken: list[float] = []
+    settled = time.perf_counter() + SETTLE
+    while not taken or time.perf_counter() < settled + SETTLE:
+        start = time.perf_counter()
+        call()
+        if start >= settled:
+            taken.append(time.perf_counter() - start)
+    return taken
+
+
 def interleaved(
     subjects: dict[str, Callable[[], object]],
     points: int,
@@ -70,20 +86,20 @@ def interleaved(
     seconds: float = 2.0,
     compilation: dict[str, float] | None = None,
 ) -> list[Timing]:
-    """Run all subjects in turn, again and again, for about `seconds` in all (at least 5 rounds).
+    """Run all subjects in turns, again and again, for about `seconds` in all (at least 5 rounds).
 
-    Each round has an order of its own: threads that spin after their work would always slow the same next subject.
+    A turn begins with calls that aren't timed, until `SETTLE` has passed: the threads of whoever ran before still spin, and
+    its own have gone to sleep. Each round has an order of its own.
     """
     for call in subjects.values():
         call()
     order, rng = list(subjects), np.random.default_rng(0)
     times: dict[str, list[float]] = {name: [] for name in subjects}
-    end = time.perf_counter() + seconds
-    while time.perf_counter() < end or len(next(iter(times.values()))) < 5:
+    end, rounds = time.perf_counter() + seconds, 0
+    while time.perf_counter() < end or rounds < 5:
+        rounds += 1
         for name in rng.permutation(order).tolist():
-            start = time.perf_counter()
-            subjects[name]()
-            times[name].append((time.perf_counter() - start) / points * 1e9)
+            times[name] += [t / points * 1e9 for t in _turn(subjects[name])]
     rows = []
     for name, t in times.items():
         lower, median, upper = np.quantile(t, [0.25, 0.5, 0.75])

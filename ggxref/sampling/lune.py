@@ -61,7 +61,7 @@ def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:
     moved, lifted, height = crescent(along, rim, pole, pole.x)
     x, y, _ = times(A.T, *(moved * e1 + across * e2 + lifted * e3))
     # The third component is p·An: `height` has its sign right where the sum would round below the horizon.
-    return jnp.stack(stable.unit(x, y, norm_n * height))
+    return stable.direction(x, y, norm_n * height)
 
 
 Tries = Float[Array, "n 2"]

@@ -31,7 +31,7 @@ def sample(u: Vec3, wi: Vec3, alpha: Vec2, *, distribution: Literal["ggx", "beck
     other = jnp.stack([-wm[0], -wm[1], wm[2]])
     share = _share(other, wi)
     # A view that is NaN chooses neither wall.
-    return jnp.where(u[2] < share, other, jnp.where(u[2] >= share, wm, jnp.nan))
+    return stable.either(u[2] < share, other, stable.either(u[2] >= share, wm, jnp.full(3, jnp.nan, wm.dtype)))
 
 
 @stable.widened

@@ -203,7 +203,7 @@ def evaluate(kind: Kind, row: Rows, wi: Vec3, wo: Vec3) -> tuple[Scalar, Scalar]
     wm = geometry.half_reflection(wi, wo)
     if kind.surface == "dielectric":
         across = geometry.half_refraction(wi, wo, jnp.ones_like(row.eta), row.eta)
-        wm = _either(wo[2] > 0, wm, across)
+        wm = stable.either(wo[2] > 0, wm, across)
     value, pdf = _with_diffuse(kind, row, wo, *_at(kind, row, wi, wo, wm))
     return _rounded(kind, row, value), _rounded(kind, row, pdf)
 
@@ -224,11 +224,6 @@ def _direction(kind: Kind, row: Rows, w: Vec3) -> Vec3:
     return w if kind.precision == ("float32",) else stable.direction(*_rounded(kind, row, w))
 
 
-def _either(condition: Array, one: Vec3, other: Vec3) -> Vec3:
-    """A component at a time: a `where` of vectors puts the lanes first, and XLA reads them in strides ever after."""
-    return jnp.stack([jnp.where(condition, x, y) for x, y in zip(one, other, strict=True)])
-
-
 def cosine_lobe(u: Vec2) -> Vec3:
     """A direction with density cos θ/π: unit, (3,)."""
     c, s = stable.cos_sin_turn(u[0])
@@ -246,9 +241,9 @@ def sample(kind: Kind, row: Rows, u: Array, wi: Vec3) -> Scatter:
     wo = geometry.reflect(wi, wm)
     if kind.surface == "dielectric":
         F = _fresnel(kind, row, stable.cosine(wi, wm))
-        wo = _either(u[3] < F, wo, geometry.refract(wi, wm, 1 / row.eta))
+        wo = stable.either(u[3] < F, wo, geometry.refract(wi, wm, 1 / row.eta))
     if kind.diffuse:
-        wo = _either(u[3] < _diffuse_share(row), cosine_lobe(u[:2]), wo)
+        wo = stable.either(u[3] < _diffuse_share(row), cosine_lobe(u[:2]), wo)
         wm = geometry.half_reflection(wi, wo)
     value, pdf = _with_diffuse(kind, row, wo, *_at(kind, row, wi, wo, wm))
     return Scatter(_direction(kind, row, wo), _rounded(kind, row, value), _rounded(kind, row, pdf))
