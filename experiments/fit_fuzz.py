@@ -32,9 +32,10 @@ def main() -> None:
         path = Path(folder) / "case"
         for _ in range(given.cases):
             content = fit_fuzz.mutated(random_, seeds)
-            before = time.perf_counter()
+            # Processor time: the clock on the wall would time what else the machine does.
+            before = time.process_time()
             outcomes[fit_fuzz.outcome(content, path)] += 1
-            slowest = max(slowest, time.perf_counter() - before)
+            slowest = max(slowest, time.process_time() - before)
         tracemalloc.start()
         most = 0.0
         for _ in range(given.memory):
@@ -45,7 +46,7 @@ def main() -> None:
             most = max(most, (tracemalloc.get_traced_memory()[1] - base) / max(len(content), 4096))
     seconds = time.perf_counter() - start
     print(
-        f"{given.cases} cases in {seconds:.0f} s: {outcomes}; slowest {slowest * 1e3:.0f} ms; most memory {most:.0f} x the file"
+        f"{given.cases} cases in {seconds:.0f} s: {outcomes}; slowest {slowest * 1e3:.0f} ms CPU; most memory {most:.0f} x the file"
     )
 
 

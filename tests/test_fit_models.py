@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 from ggxref import fresnel, geometry, masking, slopes
 from ggxref.errors import InputError
-from ggxref.fit import levenberg, models, parameters, rows, solver, student
+from ggxref.fit import kernel, levenberg, models, parameters, rows, solver, student
 from ggxref.fit.models import Surface
 
 NAMES = parameters.names(("brdf",))
@@ -155,13 +155,10 @@ class TestRows:
     def rows(self):
         count = len(self.DEGREES)
         index = np.pad(np.arange(count), (0, rows.ROW - count), constant_values=-1)[None]
-        samples = (*directions(self.DEGREES), self.MEASURED, np.full(count, 0.01))
-        return rows.Rows(
-            tuple(np.moveaxis(a[..., index], -2, 0) for a in samples),
-            np.where(index >= 0, 1.5, 0.0),
-            index,
-            np.zeros(1, int),
-        )
+        samples = np.concatenate([*directions(self.DEGREES), np.full((2, count), [[0.01], [1.5]]), self.MEASURED])
+        padded = np.where(index >= 0, samples[:, index], 1.0).swapaxes(0, 1)
+        padded[:, kernel.WEIGHT] *= index >= 0
+        return rows.Rows(padded, index, np.zeros(1, int))
 
     def loss(self, theta):
         """Σ weights · mean over bands of √(1 + r²) − 1."""
@@ -172,7 +169,7 @@ class TestRows:
         return 1.5 * np.sum(np.mean(np.sqrt(1 + r * r) - 1, axis=0))
 
     def at(self, theta, some):
-        return rows.each(Surface(), theta[None], rows.pack(some, np.zeros(1, int), some.weights), lambda each: each)[0]
+        return rows.each(Surface(), theta[None], rows.pack(some, np.zeros(1, int)), lambda each: each)[0]
 
     def test_losses_and_gradients(self):
         some = self.rows()
@@ -192,7 +189,7 @@ class TestRows:
         wi, wo, wm = directions(self.DEGREES)
         with solver.float64():
             exact = models.brdfs(self.BANDS, wi, wo, wm, Surface())
-        some.samples[3][0, :, : exact.shape[1]] = exact
+        some.samples[0, kernel.VALUES, : exact.shape[1]] = exact
         found = self.at(self.BANDS, some)
         hessian = found.terms().hessian
         assert_allclose(found.bread(), hessian, rtol=1e-12)
@@ -206,7 +203,7 @@ class TestRows:
         some = self.rows()
         many = np.zeros(2 * rows.CALL + 3, int)
         theta = self.BANDS + 0.01 * np.arange(len(many))[:, None]
-        pieces = rows.each(Surface(), theta, rows.pack(some, many, some.weights[many]), lambda each: each)
+        pieces = rows.each(Surface(), theta, rows.pack(some, many), lambda each: each)
         alone = self.at(theta[-1], some)
         assert [len(piece.losses) for piece in pieces] == [rows.CALL, rows.CALL, 3]
         assert_allclose(pieces[-1].factors[-1], alone.factors[0], rtol=1e-12)

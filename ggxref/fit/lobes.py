@@ -7,9 +7,10 @@ import numpy as np
 
 from ggxref.fit import levenberg, parameters, rows
 from ggxref.fit.found import Found
+from ggxref.fit.kernel import NOISE, VALUES, Each
 from ggxref.fit.parameters import Space
 from ggxref.fit.problem import Problem
-from ggxref.fit.rows import Each, Lanes, Rows
+from ggxref.fit.rows import Lanes, Rows
 from ggxref.fit.uncertainty import Curvature
 
 FEW = 512
@@ -122,7 +123,7 @@ def _curvature(bank: Bank, surface, k: int, theta: np.ndarray, space: Space) -> 
         return each.terms().gradient, each.bread(), np.zeros(0) if few else each.scores()
 
     at = np.tile(theta, (len(which), 1))
-    gradient, bread, each = _joined(rows.each(surface, at, rows.pack(cut, which, cut.weights), of))
+    gradient, bread, each = _joined(rows.each(surface, at, rows.pack(cut, which), of))
     if few:
         numbers = np.unique(block)
         scores = np.stack([gradient[block == b].sum(axis=0) for b in numbers]) @ columns
@@ -164,7 +165,7 @@ def _held_out(
 def _losses_of(bank: Bank, surface, k: int, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The mean loss on each fold f of problem k at θ_f (folds, p), and there on each block."""
     problem, which = bank.problems[k], bank.of[k]
-    pieces = rows.pack(bank.all, which, bank.all.weights[which])
+    pieces = rows.pack(bank.all, which)
     found = rows.each(surface, theta[bank.all.fold[which]], pieces, lambda each: each.losses.mean(axis=1))
     index, loss = bank.all.index[which], np.concatenate(found)
     every = np.empty(problem.size)
@@ -187,9 +188,11 @@ def _without(theta: np.ndarray, space: Space, folds: _Folds) -> np.ndarray:
 def _residuals(bank: Bank, surface, k: int, theta: np.ndarray) -> np.ndarray:
     """(n, bands): log(f̂/f), with the sign lost; NaN where f is not positive."""
     problem, which = bank.problems[k], bank.of[k]
-    *directions, measured, noise = bank.all.samples
-    plain = bank.all._replace(samples=(*directions, np.where(measured > 0, measured, 1.0), np.zeros_like(noise)))
-    pieces = rows.pack(plain, which, bank.all.weights[which])
+    plain = bank.all.samples[which]
+    plain[:, NOISE] = 0
+    measured = plain[:, VALUES]
+    measured[measured <= 0] = 1
+    pieces = rows.pack(bank.all._replace(samples=plain), np.arange(len(which)))
     found = np.concatenate(rows.each(surface, np.tile(theta, (len(which), 1)), pieces, lambda each: each.losses))
     index = bank.all.index[which]
     residuals = np.empty((problem.size, measured.shape[1]))
