@@ -26,9 +26,10 @@ from ggxref.errors import InputError
 from ggxref.files import write_atomically
 from ggxref.fit import models, objectives, parameters, selection, solver
 from ggxref.fit.data import Reflectance, Source, direction
-from ggxref.fit.fitting import TAILS, Fit, fit_many
+from ggxref.fit.fitting import Fit, fit_many
 from ggxref.fit.models import Surface
 from ggxref.fit.parameters import Model
+from ggxref.fit.preparation import TAILS
 from ggxref.fit.problem import Problem, from_reflectance, from_slopes
 from ggxref.fit.slopes import TILES, Slopes
 

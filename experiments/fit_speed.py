@@ -19,9 +19,10 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 import fit_data
 
-from ggxref.fit import levenberg, lobes, parameters, rows
+from ggxref.fit import lobes, parameters
 from ggxref.fit.data import Reflectance, Source, direction
-from ggxref.fit.fitting import Options, fit_prepared, prepare
+from ggxref.fit.fitting import fit_prepared
+from ggxref.fit.preparation import Options, prepare
 
 
 def measured(samples: int, seed: int) -> Reflectance:
@@ -75,15 +76,11 @@ def beside_scipy(data: Reflectance) -> None:
         return numpy_residuals(theta, wi, wo, wm, f, noise)
 
     space = parameters.space(parameters.SHAPES["ellipsoid"], problem.parameters, {}, problem.scale)
-    bank = lobes.bank([problem])
     surface = problem.surface
     assert surface
 
     def ours():
-        lanes = rows.Lanes(surface, bank.all, bank.of, [bank.all.weights])
-        return levenberg.minimise(
-            lanes.terms, start[None], space.basis[None], lanes.samples, settled=lobes.SETTLED, most=lobes.MOST_STEPS
-        )
+        return lobes.minima(lobes.bank([problem]), surface, [space], [start[None]])[0]
 
     def theirs():
         return scipy.optimize.least_squares(residuals, start[keep])

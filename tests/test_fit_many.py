@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from ggxref.cli import app
 from ggxref.fit import fit, many, read
-from ggxref.fit.fitting import Options
+from ggxref.fit.preparation import Options
 
 PLANE = fit_data.plane_angles()
 OPTIONS = Options(tail="ggx")

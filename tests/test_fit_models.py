@@ -169,7 +169,7 @@ class TestRows:
         return 1.5 * np.sum(np.mean(np.sqrt(1 + r * r) - 1, axis=0))
 
     def at(self, theta, some):
-        return rows.each(Surface(), theta[None], rows.pack(some, np.zeros(1, int)), lambda each: each)[0]
+        return rows.each(Surface(), theta[None], some, lambda each: each)[0]
 
     def test_losses_and_gradients(self):
         some = self.rows()
@@ -203,7 +203,7 @@ class TestRows:
         some = self.rows()
         many = np.zeros(2 * rows.CALL + 3, int)
         theta = self.BANDS + 0.01 * np.arange(len(many))[:, None]
-        pieces = rows.each(Surface(), theta, rows.pack(some, many), lambda each: each)
+        pieces = rows.each(Surface(), theta, some, lambda each: each, many)
         alone = self.at(theta[-1], some)
         assert [len(piece.losses) for piece in pieces] == [rows.CALL, rows.CALL, 3]
         assert_allclose(pieces[-1].factors[-1], alone.factors[0], rtol=1e-12)

@@ -11,6 +11,7 @@ from rich.table import Table
 from ggxref.files import write_atomically
 from ggxref.fit import bootstrap, export, fitting, readers, report
 from ggxref.fit.many import fit_files
+from ggxref.fit.preparation import Options
 
 
 class Outputs(NamedTuple):
@@ -65,6 +66,6 @@ def many(
     files: Sequence[Path], table: Path, given: dict, pixel: tuple[float, float] | None, advance: Callable[[int], None]
 ) -> bool:
     """Fit many files into a table; whether all of them went well."""
-    rows = fit_files(files, table, fitting.Options(**given), pixel, advance)
+    rows = fit_files(files, table, Options(**given), pixel, advance)
     Console().print(_listing(rows))
     return all(row["status"] == "good" for row in rows)

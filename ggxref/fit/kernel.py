@@ -123,7 +123,7 @@ def _call(surface: Surface, theta: Array, samples: Array) -> Array:
     return jnp.stack(jax.lax.optimization_barrier(jax.vmap(row)(theta, samples)), axis=2)
 
 
-def call(surface: Surface, theta: np.ndarray, samples: Array, size: int) -> Each:
+def call(surface: Surface, theta: np.ndarray, samples: np.ndarray, size: int) -> Each:
     """Of the first `size` of these rows."""
     found = np.asarray(_call(surface, theta, samples))[:size]
-    return Each(np.asarray(samples)[:size, WEIGHT], found[:, :, -1], found[:, :, :-1])
+    return Each(samples[:size, WEIGHT], found[:, :, -1], found[:, :, :-1])

@@ -38,17 +38,25 @@ Evaluate = Callable[[np.ndarray, np.ndarray], Terms]
 
 
 def minimise(
-    evaluate: Evaluate, theta: np.ndarray, bases: np.ndarray, samples: np.ndarray, *, settled: float, most: int
+    evaluate: Evaluate,
+    theta: np.ndarray,
+    bases: np.ndarray,
+    samples: np.ndarray,
+    *,
+    settled: float,
+    most: int,
+    instead: np.ndarray | None = None,
 ) -> Minima:
     """The minimum of each lane, from `theta` (l, p) along `bases` (l, p, p), whose unused columns are 0.
 
     - `evaluate(theta, lanes)`: the terms of these lanes at these θ. `samples`: (l,), how many each lane's mean is over.
     - `settled`: a lane is done when its next step is this many standard errors long, were its samples independent.
+    - `instead`: (l, p), where a lane begins if its loss there is less.
     """
-    theta = theta.copy()
+    theta, begun = _begun(evaluate, bases, theta, instead)
     met = np.zeros(len(theta), bool)
     damping, growth = np.full(len(theta), FIRST_DAMPING), np.full(len(theta), 2.0)
-    loss, gradient, hessian = (part.copy() for part in _reduced(evaluate(theta, np.arange(len(theta))), bases))
+    loss, gradient, hessian = (part.copy() for part in begun)
     active = np.isfinite(loss)
     valley = _Quadratic(*(part.copy() for part in _quadratic(hessian, gradient)))
     for _ in range(most):
@@ -77,6 +85,22 @@ def minimise(
         # A step that brings nothing although almost nothing was foretold: the bottom, as far as rounding shows it.
         met[refused] |= predicted[~better] <= NEGLIGIBLE * np.maximum(loss[refused], 1)
     return Minima(theta, loss, met)
+
+
+def _begun(
+    evaluate: Evaluate, bases: np.ndarray, theta: np.ndarray, instead: np.ndarray | None
+) -> tuple[np.ndarray, Terms]:
+    """Each lane's start and the terms there: θ, or what is lower."""
+    everyone = np.arange(len(theta))
+    terms = _reduced(evaluate(theta, everyone), bases)
+    if instead is None:
+        return theta.copy(), terms
+    other = _reduced(evaluate(instead, everyone), bases)
+    lower = np.flatnonzero(other.loss < terms.loss)
+    theta, terms = theta.copy(), Terms(*(part.copy() for part in terms))
+    for part, better in zip((theta, *terms), (instead, *other), strict=True):
+        part[lower] = better[lower]
+    return theta, terms
 
 
 def _reduced(terms: Terms, bases: np.ndarray) -> Terms:

@@ -8,6 +8,8 @@ import numpy as np
 from ggxref.fit import levenberg, parameters, rows
 from ggxref.fit.found import Found
 from ggxref.fit.kernel import NOISE, VALUES, Each
+from ggxref.fit.levenberg import Minima
+from ggxref.fit.models import Surface
 from ggxref.fit.parameters import Space
 from ggxref.fit.problem import Problem
 from ggxref.fit.rows import Lanes, Rows
@@ -45,59 +47,80 @@ def _numbers(several: list[Rows]) -> list[np.ndarray]:
     return [np.arange(end - len(each.weights), end) for end, each in zip(ends, several, strict=True)]
 
 
-def solve(bank: Bank, tail: str, spaces: list[Space], starts: list[np.ndarray]) -> list[Found]:
-    """The minimum of each problem in its space, from its starts θ, (starts, p), the last of which is nearly one already."""
+def solve(
+    bank: Bank, tail: str, spaces: list[Space], starts: list[np.ndarray], smaller: list[np.ndarray] | None = None
+) -> list[Found]:
+    """The minimum of each problem in its space, from its starts θ, (starts, p), as `minima` has it."""
     surface = bank.problems[0].surface
     assert surface is not None
     surface = replace(surface, tail=tail)
-    begun, agreeing = _from_starts(bank, surface, spaces, starts)
-    bases = np.stack([space.basis for space in spaces])
-    lanes = _lanes(surface, bank.all, bank.of)
-    minima = levenberg.minimise(lanes.terms, begun, bases, lanes.samples, settled=SETTLED, most=MOST_STEPS)
+    found, agreeing = minima(bank, surface, spaces, starts, smaller)
     names = [problem.parameters for problem in bank.problems]
-    pinned = [parameters.at_bounds(*each) for each in zip(spaces, minima.theta, names, strict=True)]
+    pinned = [parameters.at_bounds(*each) for each in zip(spaces, found.theta, names, strict=True)]
     spaces = [parameters.without(*each) for each in zip(spaces, pinned, names, strict=True)]
-    at = [_curvature(bank, surface, k, minima.theta[k], spaces[k]) for k in range(len(spaces))]
-    held_out = _held_out(bank, surface, minima.theta, spaces, [each[1] for each in at])
+    at = [_curvature(bank, surface, k, found.theta[k], spaces[k]) for k in range(len(spaces))]
+    held_out = _held_out(bank, surface, found.theta, spaces, [each[1] for each in at])
     return [
         Found(
-            theta=minima.theta[k],
-            loss=float(minima.loss[k]),
-            met=bool(minima.met[k]),
+            theta=found.theta[k],
+            loss=float(found.loss[k]),
+            met=bool(found.met[k]),
             space=spaces[k],
-            agreeing=(int(agreeing[k]), len(starts[k])),
+            agreeing=agreeing[k],
             at=at[k][0],
             held_out=held_out[k][0],
             held_out_blocks=held_out[k][1],
-            residuals=_residuals(bank, surface, k, minima.theta[k]),
+            residuals=_residuals(bank, surface, k, found.theta[k]),
         )
         for k in range(len(spaces))
     ]
 
 
-def _lanes(surface, rows: Rows, which: list[np.ndarray]) -> Lanes:
+def _lanes(surface: Surface, rows: Rows, which: list[np.ndarray]) -> Lanes:
     return Lanes(surface, rows, which, [rows.weights[numbers] for numbers in which])
 
 
-def _from_starts(bank: Bank, surface, spaces: list[Space], starts: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Where to begin with all samples, (problems, p), and how many starts ended there."""
+def minima(
+    bank: Bank,
+    surface: Surface,
+    spaces: list[Space],
+    starts: list[np.ndarray],
+    smaller: list[np.ndarray] | None = None,
+) -> tuple[Minima, list[tuple[int, int]]]:
+    """The minimum of each problem, and how many of how many starts agreed on it: from all of them on few samples, from the best on all.
+
+    - `smaller`: θ (p,) of each problem, the minimum of a smaller model: one start more.
+    """
+    inside = [_inside(*each) for each in zip(spaces, starts, strict=True)]
+    last = None
+    if smaller:
+        last = np.concatenate([_inside(space, theta[None]) for space, theta in zip(spaces, smaller, strict=True)])
+        inside = [np.vstack(each) for each in zip(inside, last, strict=True)]
+    begun, agreeing = _from_starts(bank, surface, spaces, inside)
+    bases = np.stack([space.basis for space in spaces])
+    lanes = _lanes(surface, bank.all, bank.of)
+    # The smaller model's minimum may be lower on all samples than what the few led to.
+    return levenberg.minimise(
+        lanes.terms, begun, bases, lanes.samples, settled=SETTLED, most=MOST_STEPS, instead=last
+    ), agreeing
+
+
+def _inside(space: Space, starts: np.ndarray) -> np.ndarray:
+    """The points of the space nearest to the starts (starts, p)."""
+    return np.stack([space.held + space.basis @ space.coordinates(row) for row in starts])
+
+
+def _from_starts(
+    bank: Bank, surface: Surface, spaces: list[Space], starts: list[np.ndarray]
+) -> tuple[np.ndarray, list[tuple[int, int]]]:
+    """Where to begin with all samples, (problems, p), and how many of how many starts ended there."""
     owner = np.repeat(np.arange(len(starts)), [len(each) for each in starts])
     few = _lanes(surface, bank.few, [bank.few_of[k] for k in owner])
     bases = np.stack([spaces[k].basis for k in owner])
-    inside = np.concatenate(
-        [[s.held + s.basis @ s.coordinates(row) for row in each] for s, each in zip(spaces, starts, strict=True)]
-    )
-    found = levenberg.minimise(few.terms, inside, bases, few.samples, settled=NEARLY, most=FIRST_STEPS)
-    best = [np.flatnonzero(owner == k)[np.argmin(found.loss[owner == k])] for k in range(len(starts))]
-    agreeing = np.array(
-        [np.sum(found.loss[owner == k] <= found.loss[best[k]] * (1 + AGREE)) for k in range(len(starts))]
-    )
-    # A smaller model's minimum, the last start, may be lower on all samples than what the few led to.
-    last = np.cumsum([len(each) for each in starts]) - 1
-    lanes, everyone = _lanes(surface, bank.all, bank.of), np.arange(len(starts))
-    ends, smaller = found.theta[best], inside[last]
-    lower = lanes.terms(smaller, everyone).loss < lanes.terms(ends, everyone).loss
-    return np.where(lower[:, None], smaller, ends), agreeing
+    found = levenberg.minimise(few.terms, np.concatenate(starts), bases, few.samples, settled=NEARLY, most=FIRST_STEPS)
+    several = [(found.theta[owner == k], found.loss[owner == k]) for k in range(len(starts))]
+    agreeing = [(int(np.sum(loss <= loss.min() * (1 + AGREE))), len(loss)) for _, loss in several]
+    return np.stack([theta[np.argmin(loss)] for theta, loss in several]), agreeing
 
 
 class _Folds(NamedTuple):
@@ -116,14 +139,13 @@ def _curvature(bank: Bank, surface, k: int, theta: np.ndarray, space: Space) -> 
     columns = space.basis[:, space.columns]
     few = len(np.unique(problem.block)) <= MOST_BLOCKS
     cut, block = rows.cut_by_block(problem) if few else (rows.cut(problem), np.zeros(0, int))
-    which = np.arange(len(cut.index))
 
     def of(each: Each) -> tuple[np.ndarray, ...]:
         # Where no row straddles two blocks, the rows' sums will do.
         return each.terms().gradient, each.bread(), np.zeros(0) if few else each.scores()
 
-    at = np.tile(theta, (len(which), 1))
-    gradient, bread, each = _joined(rows.each(surface, at, rows.pack(cut, which), of))
+    at = np.tile(theta, (len(cut.fold), 1))
+    gradient, bread, each = _joined(rows.each(surface, at, cut, of))
     if few:
         numbers = np.unique(block)
         scores = np.stack([gradient[block == b].sum(axis=0) for b in numbers]) @ columns
@@ -165,8 +187,8 @@ def _held_out(
 def _losses_of(bank: Bank, surface, k: int, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The mean loss on each fold f of problem k at θ_f (folds, p), and there on each block."""
     problem, which = bank.problems[k], bank.of[k]
-    pieces = rows.pack(bank.all, which)
-    found = rows.each(surface, theta[bank.all.fold[which]], pieces, lambda each: each.losses.mean(axis=1))
+    of_row = theta[bank.all.fold[which]]
+    found = rows.each(surface, of_row, bank.all, lambda each: each.losses.mean(axis=1), which)
     index, loss = bank.all.index[which], np.concatenate(found)
     every = np.empty(problem.size)
     every[index[index >= 0]] = loss[index >= 0]
@@ -192,8 +214,8 @@ def _residuals(bank: Bank, surface, k: int, theta: np.ndarray) -> np.ndarray:
     plain[:, NOISE] = 0
     measured = plain[:, VALUES]
     measured[measured <= 0] = 1
-    pieces = rows.pack(bank.all._replace(samples=plain), np.arange(len(which)))
-    found = np.concatenate(rows.each(surface, np.tile(theta, (len(which), 1)), pieces, lambda each: each.losses))
+    at, alone = np.tile(theta, (len(which), 1)), Rows(plain, bank.all.index[which], bank.all.fold[which])
+    found = np.concatenate(rows.each(surface, at, alone, lambda each: each.losses))
     index = bank.all.index[which]
     residuals = np.empty((problem.size, measured.shape[1]))
     # The pseudo-Huber loss l = √(1 + r²) − 1, turned round: r² = l (l + 2).

@@ -13,7 +13,8 @@ import numpy as np
 from ggxref.errors import InputError
 from ggxref.files import write_atomically
 from ggxref.fit import fitting, readers
-from ggxref.fit.fitting import Ladder, Options, Prepared
+from ggxref.fit.fitting import Ladder
+from ggxref.fit.preparation import Options, Prepared, prepare
 
 BATCH = 16
 """Files side by side; after each batch the table is written."""
@@ -64,7 +65,7 @@ def _rows(
     kinds: dict[tuple, list[tuple[Path, Prepared]]] = {}
     for path in paths:
         try:
-            prepared = fitting.prepare(readers.read(path, pixel=pixel), options)
+            prepared = prepare(readers.read(path, pixel=pixel), options)
         except InputError as error:
             yield path, {"status": f"error: {error}"}
             continue

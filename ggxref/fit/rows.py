@@ -5,13 +5,12 @@ replicate and file. Calls go round the devices, from a thread for each core.
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple, TypeVar
 
 import jax
 import numpy as np
-from jax import Array
 
 from ggxref.fit import kernel, solver
 from ggxref.fit.kernel import ROW, WEIGHT, Each
@@ -46,8 +45,12 @@ def cut(problem: Problem, kept: np.ndarray | None = None) -> Rows:
     padded = [np.pad(part, (0, -len(part) % ROW), constant_values=-1).reshape(-1, ROW) for part in parts]
     index = np.concatenate(padded)
     *directions, measured, noise = problem.samples
-    every = np.concatenate([*directions, noise[None], problem.weights[None], measured])
-    samples = np.ascontiguousarray(every[:, index].swapaxes(0, 1))
+    components = [
+        component for array in (*directions, noise[None], problem.weights[None], measured) for component in array
+    ]
+    samples = np.empty((len(index), len(components), ROW))
+    for k, component in enumerate(components):
+        samples[:, k] = component[index]
     samples[:, WEIGHT][index < 0] = 0
     return Rows(samples, index, np.repeat(np.arange(len(padded)), [len(rows) for rows in padded]))
 
@@ -60,44 +63,37 @@ def cut_by_block(problem: Problem) -> tuple[Rows, np.ndarray]:
 
 
 def join(several: list[Rows]) -> Rows:
-    return Rows(*(np.concatenate(parts) for parts in zip(*several, strict=True)))
+    return Rows(*(np.concatenate(parts) for parts in zip(*several, strict=True))) if len(several) > 1 else several[0]
 
 
-class Piece(NamedTuple):
-    """8 rows on a device. `numbers`: which of all rows they are. A short piece, of `size` rows, is filled up with its last, so
-    that every call has the one compiled shape.
+def each(
+    surface: Surface,
+    theta: np.ndarray,
+    rows: Rows,
+    of: Callable[[Each], T],
+    which: np.ndarray | None = None,
+    weights: np.ndarray | None = None,
+) -> list[T]:
+    """What `of` makes of the rows, or of those with the numbers `which` (r,), 8 by 8, at their θ (r, p).
+
+    - `weights`: (r, 256), in place of the rows' own.
     """
+    which = np.arange(len(rows.fold)) if which is None else which
+    devices = jax.local_devices()
 
-    numbers: np.ndarray
-    size: int
-    samples: Array
-
-
-def pack(rows: Rows, which: np.ndarray, weights: np.ndarray | None = None) -> list[Piece]:
-    """The rows with the numbers `which`, with their own weights or these, (r, 256), in pieces that go round the devices."""
-    devices, pieces = jax.local_devices(), []
-    for number, start in enumerate(range(0, len(which), CALL)):
+    def call(start: int) -> T:
+        # A short piece is filled up with its last row, so that every call has the one compiled shape.
         numbers = np.minimum(np.arange(start, start + CALL), len(which) - 1)
         samples = rows.samples[which[numbers]]
         if weights is not None:
             samples[:, WEIGHT] = weights[numbers]
-        with solver.float64():
-            there = jax.device_put(samples, devices[number % len(devices)])
-        pieces.append(Piece(numbers, min(CALL, len(which) - start), there))
-    return pieces
+        device = devices[start // CALL % len(devices)]
+        # All three belong to a thread. A step too far may overflow: the solver refuses it.
+        with solver.float64(), jax.default_device(device), np.errstate(all="ignore"):
+            return of(kernel.call(surface, theta[numbers], samples, min(CALL, len(which) - start)))
 
-
-def each(surface: Surface, theta: np.ndarray, pieces: list[Piece], of: Callable[[Each], T]) -> list[T]:
-    """What `of` makes of each piece's rows at their θ (r, p)."""
-
-    def call(piece: Piece) -> T:
-        # Both belong to a thread. A step too far may overflow: the solver refuses it.
-        with solver.float64(), np.errstate(all="ignore"):
-            return of(kernel.call(surface, theta[piece.numbers], piece.samples, piece.size))
-
-    if len(pieces) == 1 or _workers() == 1:
-        return [call(piece) for piece in pieces]
-    return list(_threads().map(call, pieces))
+    starts = range(0, len(which), CALL)
+    return list(map(call, starts) if len(starts) == 1 or _workers() == 1 else _threads().map(call, starts))
 
 
 def _workers() -> int:
@@ -111,6 +107,19 @@ def _threads() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(_workers())
 
 
+class Asked(NamedTuple):
+    """Some lanes side by side. `which`, `weights`: their rows; `owner`: (rows,), the lane's place among them; `first`: (lanes,), its
+    first row; `total`: (lanes,), its weight.
+    """
+
+    lanes: np.ndarray
+    which: np.ndarray
+    weights: np.ndarray
+    owner: np.ndarray
+    first: np.ndarray
+    total: np.ndarray
+
+
 @dataclass
 class Lanes:
     """Problems to solve side by side. `which`: of each lane, the numbers of its rows; `weights`: those rows', (rows, 256)."""
@@ -119,12 +128,8 @@ class Lanes:
     rows: Rows
     which: list[np.ndarray]
     weights: list[np.ndarray]
-    packed: tuple[np.ndarray, list[Piece]] = field(default_factory=lambda: (np.zeros(0, int), []))
-    """The lanes asked for last, which mostly are asked for again, and their rows."""
-
-    @property
-    def total(self) -> np.ndarray:
-        return np.array([weights.sum() for weights in self.weights])
+    last: Asked | None = None
+    """The lanes asked for last mostly are asked for again."""
 
     @property
     def samples(self) -> np.ndarray:
@@ -132,12 +137,22 @@ class Lanes:
 
     def terms(self, theta: np.ndarray, lanes: np.ndarray) -> Terms:
         """The mean loss of these lanes, its gradient and the matrix like its Hessian."""
-        owner = np.repeat(np.arange(len(lanes)), [len(self.which[k]) for k in lanes])
-        if not np.array_equal(lanes, self.packed[0]):
-            which, weights = (np.concatenate([part[k] for k in lanes]) for part in (self.which, self.weights))
-            self.packed = lanes, pack(self.rows, which, weights)
-        pieces = each(self.surface, theta[owner], self.packed[1], lambda each: (each.loss, each.products()))
-        starts, total = np.searchsorted(owner, np.arange(len(lanes))), self.total[lanes]
+        asked = self._asked(lanes)
+        at = theta[asked.owner]
+        pieces = each(
+            self.surface, at, self.rows, lambda each: (each.loss, each.products()), asked.which, asked.weights
+        )
         with np.errstate(all="ignore"):  # as in `each`
-            sums = [np.add.reduceat(np.concatenate(parts), starts) for parts in zip(*pieces, strict=True)]
-            return kernel.assemble(*(part / total.reshape(-1, *[1] * (part.ndim - 1)) for part in sums))
+            loss, products = (
+                np.add.reduceat(np.concatenate(parts), asked.first) for parts in zip(*pieces, strict=True)
+            )
+            return kernel.assemble(loss / asked.total, products / asked.total[:, None, None, None])
+
+    def _asked(self, lanes: np.ndarray) -> Asked:
+        if self.last is None or not np.array_equal(lanes, self.last.lanes):
+            which, weights = (np.concatenate([part[k] for k in lanes]) for part in (self.which, self.weights))
+            sizes = [len(self.which[k]) for k in lanes]
+            first = np.cumsum([0, *sizes[:-1]])
+            total = np.add.reduceat(weights.sum(axis=1), first)
+            self.last = Asked(lanes, which, weights, np.repeat(np.arange(len(lanes)), sizes), first, total)
+        return self.last
