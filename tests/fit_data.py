@@ -11,6 +11,7 @@ import numpy as np
 
 from ggxref import bsdf, ellipsoid, fresnel, geometry, masking, ndf
 from ggxref.fit import solver
+from ggxref.fit.data import Reflectance, Source
 from ggxref.fit.readers import rgl
 
 PIXEL = 1e-6
@@ -36,6 +37,15 @@ def direction(zenith, azimuth):
     return np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), np.cos(zenith)], axis=-1)
 
 
+def directions(degrees: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """wi, wo and their half vectors, (3, n) each."""
+    zenith_i, azimuth_i, zenith_o, azimuth_o = np.radians(degrees).T
+    wi, wo = direction(zenith_i, azimuth_i), direction(zenith_o, azimuth_o)
+    with solver.float64():
+        wm = np.asarray(jax.vmap(geometry.half_reflection)(jnp.asarray(wi), jnp.asarray(wo)))
+    return wi.T, wo.T, wm.T
+
+
 @jax.jit
 @partial(jax.vmap, in_axes=(0, 0, None, None, None))
 def _brdf(wi, wo, A, f0, diffuse):
@@ -50,6 +60,15 @@ def brdf(degrees: np.ndarray, A: np.ndarray, f0: float, diffuse: float) -> np.nd
     with solver.float64():
         wi, wo = jnp.asarray(direction(zenith_i, azimuth_i)), jnp.asarray(direction(zenith_o, azimuth_o))
         return np.asarray(_brdf(wi, wo, jnp.asarray(A), jnp.asarray(f0), jnp.asarray(diffuse)))
+
+
+def reflectance(degrees: np.ndarray, A: np.ndarray, noise: float = 0.1, seed: int = 1) -> Reflectance:
+    """A measurement of F0 0.6 and an albedo of 0.1, with lognormal noise."""
+    values = brdf(degrees, A, 0.6, 0.1) * np.exp(noise * np.random.default_rng(seed).normal(size=len(degrees)))
+    zenith_i, azimuth_i, zenith_o, azimuth_o = np.radians(degrees).T
+    one, source = np.ones(len(values)), Source("synthetic", "test", "")
+    wi, wo = direction(zenith_i, azimuth_i), direction(zenith_o, azimuth_o)
+    return Reflectance(wi, wo, values[:, None], one, one > 0, ("brdf",), source)
 
 
 def shape(mean=(0.0, 0.0), scatter=((0.04, 0.0), (0.0, 0.04))) -> np.ndarray:

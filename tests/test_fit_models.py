@@ -10,9 +10,9 @@ import pytest
 import scipy.stats
 from numpy.testing import assert_allclose
 
-from ggxref import fresnel, geometry, masking, slopes
+from ggxref import fresnel, masking, slopes
 from ggxref.errors import InputError
-from ggxref.fit import kernel, levenberg, models, parameters, rows, solver, student
+from ggxref.fit import models, parameters, solver, student
 from ggxref.fit.models import Surface
 
 NAMES = parameters.names(("brdf",))
@@ -22,24 +22,16 @@ SAME = 1e-12
 """The same algebra in another order, 20 operations deep, over directions no nearer to the horizon than 10 degrees."""
 
 
-def directions(degrees):
-    zenith_i, azimuth_i, zenith_o, azimuth_o = np.radians(degrees).T
-    wi, wo = fit_data.direction(zenith_i, azimuth_i), fit_data.direction(zenith_o, azimuth_o)
-    with solver.float64():
-        wm = np.asarray(jax.vmap(geometry.half_reflection)(jnp.asarray(wi), jnp.asarray(wo)))
-    return wi.T, wo.T, wm.T
-
-
 def test_brdf_is_the_librarys():
     degrees = fit_data.angles()
     with solver.float64():
         A = np.asarray(models.shape_matrix(THETA))
-        found = models.brdfs(THETA, *directions(degrees), Surface())
+        found = models.brdfs(THETA, *fit_data.directions(degrees), Surface())
     assert_allclose(found[0], fit_data.brdf(degrees, A, 0.2, 0.1), rtol=SAME)
 
 
 def test_g1_is_the_librarys():
-    wi, _, wm = directions(fit_data.angles())
+    wi, _, wm = fit_data.directions(fit_data.angles())
     with solver.float64():
         A = models.shape_matrix(THETA)
         expected = jax.vmap(masking.g1_ellipsoid, (-1, -1, None))(jnp.asarray(wi), jnp.asarray(wm), A)
@@ -60,7 +52,7 @@ def test_the_standard_densities_and_areas_are_the_librarys(tail):
     """At α = 1 with no mean, for γ = 3; from directions above the horizon, as of the others G1 is 1."""
     theta = np.r_[np.zeros(5), np.log(1.5), 0.0, 0.0]
     points = np.random.default_rng(2).normal(scale=2.0, size=(2, 50))
-    wi, _, _ = directions(fit_data.angles()[::7])
+    wi, _, _ = fit_data.directions(fit_data.angles()[::7])
     density = {"ggx": slopes.ggx, "beckmann": slopes.beckmann, "student_t": lambda s, a: slopes.student_t(s, a, 3.0)}
     area = {
         "ggx": slopes.sigma_ggx,
@@ -114,7 +106,7 @@ def test_no_diffuse_term_is_no_nan():
     theta = THETA.copy()
     theta[7] = -np.inf
     with solver.float64():
-        values = models.brdfs(theta, *directions(fit_data.angles()), Surface())
+        values = models.brdfs(theta, *fit_data.directions(fit_data.angles()), Surface())
         A = np.asarray(models.shape_matrix(theta))
     assert_allclose(values[0], fit_data.brdf(fit_data.angles(), A, 0.2, 0.0), rtol=SAME)
 
@@ -143,99 +135,6 @@ def test_principal_axes():
     assert_allclose([values["alpha_2"], values["alpha_1"]], np.sqrt(roots), rtol=1e-12)
     axis = vectors[:, 1] * np.sign(vectors[0, 1])
     assert_allclose(values["rotation"], np.arctan2(axis[1], axis[0]), rtol=1e-12)
-
-
-class TestRows:
-    """The compiled call's losses and derivatives against the plain formula's, for two bands."""
-
-    DEGREES = fit_data.angles()[::7]
-    MEASURED = np.abs(np.random.default_rng(0).normal(1, 0.5, size=(2, len(DEGREES))))
-    BANDS = np.r_[THETA[:6], THETA[6], THETA[6] + 1, THETA[7], THETA[7] - 1]
-
-    def rows(self):
-        count = len(self.DEGREES)
-        index = np.pad(np.arange(count), (0, rows.ROW - count), constant_values=-1)[None]
-        samples = np.concatenate([*directions(self.DEGREES), np.full((2, count), [[0.01], [1.5]]), self.MEASURED])
-        padded = np.where(index >= 0, samples[:, index], 1.0).swapaxes(0, 1)
-        padded[:, kernel.WEIGHT] *= index >= 0
-        return rows.Rows(padded, index, np.zeros(1, int))
-
-    def loss(self, theta):
-        """Σ weights · mean over bands of √(1 + r²) − 1."""
-        wi, wo, wm = directions(self.DEGREES)
-        with solver.float64():
-            model = models.brdfs(theta, wi, wo, wm, Surface())
-        r = np.log((model * wo[2] + 0.01) / (self.MEASURED * wo[2] + 0.01))
-        return 1.5 * np.sum(np.mean(np.sqrt(1 + r * r) - 1, axis=0))
-
-    def at(self, theta, some):
-        return rows.each(Surface(), theta[None], some, lambda each: each)[0]
-
-    def test_losses_and_gradients(self):
-        some = self.rows()
-        found = self.at(self.BANDS, some)
-        loss, gradient, _ = found.terms()
-        assert_allclose((found.losses.mean(axis=1) * some.weights).sum(), self.loss(self.BANDS), rtol=1e-12)
-        assert_allclose(loss[0], self.loss(self.BANDS), rtol=1e-12)
-        step = 1e-6 * np.eye(len(self.BANDS))
-        slope = [(self.loss(self.BANDS + s) - self.loss(self.BANDS - s)) / 2e-6 for s in step]
-        # Differences over 1e-6 keep ten digits of a loss of order 100.
-        assert_allclose(gradient[0], slope, rtol=1e-6, atol=1e-6)
-        assert_allclose(found.scores().sum(axis=-1), gradient, rtol=1e-10, atol=1e-12 * np.abs(gradient).max())
-
-    def test_the_matrices_at_a_perfect_fit_are_the_hessian(self):
-        """There r = 0, so that both weights are 1 and what they leave out is 0."""
-        some = self.rows()
-        wi, wo, wm = directions(self.DEGREES)
-        with solver.float64():
-            exact = models.brdfs(self.BANDS, wi, wo, wm, Surface())
-        some.samples[0, kernel.VALUES, : exact.shape[1]] = exact
-        found = self.at(self.BANDS, some)
-        hessian = found.terms().hessian
-        assert_allclose(found.bread(), hessian, rtol=1e-12)
-        step = 1e-5 * np.eye(len(self.BANDS))
-        ahead, behind = (
-            np.stack([self.at(self.BANDS + sign * s, some).terms().gradient[0] for s in step]) for sign in (1, -1)
-        )
-        assert_allclose(hessian[0], (ahead - behind) / 2e-5, rtol=1e-6, atol=1e-6 * np.abs(hessian).max())
-
-    def test_calls_in_pieces_are_the_same(self):
-        some = self.rows()
-        many = np.zeros(2 * rows.CALL + 3, int)
-        theta = self.BANDS + 0.01 * np.arange(len(many))[:, None]
-        pieces = rows.each(Surface(), theta, some, lambda each: each, many)
-        alone = self.at(theta[-1], some)
-        assert [len(piece.losses) for piece in pieces] == [rows.CALL, rows.CALL, 3]
-        assert_allclose(pieces[-1].factors[-1], alone.factors[0], rtol=1e-12)
-
-
-class TestLevenberg:
-    """Rosenbrock's valley, as residuals (10 (y − x²), 1 − x), from several places at once."""
-
-    def terms(self, theta, lanes):
-        x, y = theta.T
-        r = np.stack([10 * (y - x * x), 1 - x], axis=-1)
-        J = np.stack([np.stack([-20 * x, np.full_like(x, 10)], -1), np.stack([-np.ones_like(x), 0 * x], -1)], -2)
-        return levenberg.Terms((r * r).sum(-1) / 2, np.einsum("lri,lr->li", J, r), np.einsum("lri,lrj->lij", J, J))
-
-    def test_all_lanes_arrive(self):
-        starts = np.array([[-1.2, 1.0], [2.0, 2.0], [0.0, -1.0]])
-        found = levenberg.minimise(
-            self.terms, starts, np.tile(np.eye(2), (3, 1, 1)), np.full(3, 100), settled=1e-3, most=100
-        )
-        assert found.met.all()
-        assert_allclose(found.theta, 1, atol=1e-6)
-
-    def test_a_held_direction_stays(self):
-        basis = np.diag([1.0, 0.0])[None]
-        found = levenberg.minimise(self.terms, np.array([[0.5, 0.25]]), basis, np.full(1, 100), settled=1e-6, most=100)
-        assert found.met[0] and found.theta[0, 1] == 0.25
-
-    def test_too_few_steps_are_said(self):
-        basis = np.eye(2)[None]
-        assert not levenberg.minimise(
-            self.terms, np.array([[-1.2, 1.0]]), basis, np.full(1, 100), settled=1e-3, most=3
-        ).met[0]
 
 
 class TestStudent:
@@ -287,7 +186,7 @@ class TestStudent:
 
 @pytest.mark.parametrize("masking_name", ["separable", "v_cavity"])
 def test_other_masking(masking_name):
-    wi, wo, wm = directions(fit_data.angles()[::11])
+    wi, wo, wm = fit_data.directions(fit_data.angles()[::11])
     with solver.float64():
         i, o, m = jnp.asarray(wi), jnp.asarray(wo), jnp.asarray(wm)
         surface = Surface(masking=masking_name)
@@ -299,7 +198,7 @@ def test_other_masking(masking_name):
 
 
 def test_a_conductor():
-    wi, wo, wm = directions(fit_data.angles()[::11])
+    wi, wo, wm = fit_data.directions(fit_data.angles()[::11])
     with solver.float64():
         theta = jnp.asarray(np.array([*THETA[:6], np.log(0.2), np.log(3.0), -np.inf]))
         found = models.brdfs(theta, wi, wo, wm, Surface(fresnel="conductor"))

@@ -9,13 +9,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from ggxref.errors import InputError
-from ggxref.fit import bootstrap, identification, models, parameters, residual_map, selection, solver, sphere
-from ggxref.fit.data import Heights, Reflectance, Source, direction
+from ggxref.fit import bootstrap, models, parameters, residual_map, selection, solver, sphere
+from ggxref.fit.data import Heights, Reflectance, Source
 from ggxref.fit.fitting import fit, fit_models
 from ggxref.fit.models import Surface
 from ggxref.fit.problem import from_reflectance, from_slopes
 from ggxref.fit.slopes import TILES, Slopes
-from ggxref.fit.uncertainty import Curvature, curvature, spread
 
 SURE = 4.0
 """Standard errors that a seeded estimate may be off: 6e-5 by chance where it is unbiased and its error right."""
@@ -39,21 +38,8 @@ def truth(model):
     }
 
 
-def reflectance(model, degrees, noise=0.1, seed=1):
-    """A measurement with lognormal noise."""
-    A = fit_data.shape(MEAN[model], SCATTER[model])
-    values = fit_data.brdf(degrees, A, 0.6, 0.1)
-    values = values * np.exp(noise * np.random.default_rng(seed).normal(size=len(values)))
-    zenith_i, azimuth_i, zenith_o, azimuth_o = np.radians(degrees).T
-    return Reflectance(
-        wi=direction(zenith_i, azimuth_i),
-        wo=direction(zenith_o, azimuth_o),
-        values=values[:, None],
-        weights=np.ones(len(values)),
-        mask=np.ones(len(values), bool),
-        bands=("brdf",),
-        source=Source("synthetic", "test", ""),
-    )
+def reflectance(model, degrees):
+    return fit_data.reflectance(degrees, fit_data.shape(MEAN[model], SCATTER[model]))
 
 
 def slopes(model, count=8192, seed=1, gamma=2.0):
@@ -243,39 +229,6 @@ class TestTrouble:
             fit(reflectance("isotropic", fit_data.angles()), **cast(dict, {option: "none"}))
 
 
-@pytest.fixture(scope="module")
-def sound():
-    return fit(reflectance("anisotropic", fit_data.angles()), model="anisotropic", tail="ggx")
-
-
-class TestWhatIsSaid:
-    """One sentence for all parameters of which it is true."""
-
-    def said(self, sound, **changes):
-        return identification.warnings(replace(sound, fits=(replace(sound.best, **changes),)))
-
-    def test_nothing_of_a_sound_fit(self, sound):
-        assert self.said(sound) == []
-
-    def test_bounds(self, sound):
-        assert self.said(sound, at_bound=("f0 r", "diffuse", "f0 g")) == [
-            "f0 r, f0 g ran to 0 or 1: held there, without a standard error",
-            "diffuse ran to 0: held there, without a standard error",
-        ]
-
-    def test_ties(self, sound):
-        correlation = np.eye(len(sound.problem.parameters))
-        correlation[0, 6] = correlation[6, 7] = -0.97
-        assert self.said(sound, correlation=correlation) == [
-            "hard to tell apart, by their correlation: alpha_x and f0 (-0.970), f0 and diffuse (-0.970)"
-        ]
-
-    def test_a_misfit(self, sound):
-        assert self.said(sound, log_rmse=2.0) == [
-            "no model here fits: the values are off by a factor of 7.39, e to the log-RMSE"
-        ]
-
-
 class TestTails:
     @pytest.mark.parametrize(("gamma", "name"), [(2.0, "rotated"), (3.5, "rotated student_t")])
     def test_the_tail_is_found(self, gamma, name):
@@ -298,50 +251,6 @@ class TestTails:
         alone = fit_models(problem, GGX[1:2], {})[0]
         ladder = parameters.ladder({"anisotropic": parameters.SHAPES["anisotropic"]}, ["ggx", "student_t"])
         assert fit_models(problem, ladder, {})[0].loss == pytest.approx(alone.loss, rel=1e-12)
-
-
-class TestSpread:
-    def space(self, size):
-        return parameters.Space(np.zeros(size), np.eye(size))
-
-    def test_least_squares_of_a_line(self):
-        """For a straight line with independent noise the sandwich is the textbook's covariance."""
-        random = np.random.default_rng(3)
-        x = np.linspace(-1, 1, 4000)
-        design = np.stack([np.ones_like(x), x], axis=1)
-        y = design @ [0.2, 0.5] + 0.3 * random.normal(size=len(x))
-        best = np.linalg.lstsq(design, y)[0]
-        at = curvature(lambda theta: (y - design @ theta) ** 2 / 2, best, self.space(2))
-        assert_allclose(at.hessian, design.T @ design, atol=1e-5 * len(x))
-        expected = 0.3**2 * np.linalg.inv(design.T @ design)
-        # 4000 squares of normals are sure to sqrt(2/4000), 2.2 %.
-        assert_allclose(spread(at, self.space(2)).covariance, expected, atol=SURE * 0.022 * expected.max())
-
-    def test_differences_are_derivatives(self):
-        random = np.random.default_rng(4)
-        place, matrix = random.normal(size=3), random.normal(size=(3, 3))
-        at = curvature(lambda theta: np.exp(matrix @ theta), place, self.space(3))
-        each = np.exp(matrix @ place)
-        # Relative to the largest: STEP² is 1e-6, and the derivatives' own growth is of order 1.
-        assert_allclose(at.scores, matrix * each[:, None], atol=1e-5 * np.abs(at.scores).max())
-        assert_allclose(at.hessian, (matrix.T * each) @ matrix, atol=1e-5 * np.abs(at.hessian).max())
-
-    def test_blocks_that_move_together_widen_it(self):
-        scores = np.random.default_rng(4).normal(size=(500, 1))
-        one = spread(Curvature(np.eye(1), scores), self.space(1)).covariance
-        together = spread(Curvature(np.eye(1), 4 * scores), self.space(1)).covariance
-        assert_allclose(together, 16 * one)
-
-    def test_a_valley_is_no_point(self):
-        flat = Curvature(np.diag([1.0, 0.0]), np.random.default_rng(5).normal(size=(50, 2)))
-        assert spread(flat, self.space(2)).valley.tolist() == [0, 1]
-        round = Curvature(np.diag([1.0, 0.5]), flat.scores)
-        assert not spread(round, self.space(2)).valley.any()
-
-    def test_a_gradient_left_over_shows(self):
-        scores = np.random.default_rng(6).normal(size=(50, 1))
-        assert spread(Curvature(np.eye(1) * 50, scores - scores.mean()), self.space(1)).newton < 1e-9
-        assert spread(Curvature(np.eye(1) * 50, scores + 1), self.space(1)).newton > 1
 
 
 class TestChoose:

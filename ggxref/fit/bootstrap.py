@@ -12,6 +12,8 @@ SEED = 1
 SETTLED = 0.05
 """Standard errors that may be left to a replicate's minimum: nothing beside the spread of the replicates."""
 MOST_STEPS = 30
+AT_ONCE = 2**20
+"""Samples of replicates side by side: each carries its weight, so that they bound the memory."""
 
 
 def intervals(ladder: Ladder, replicates: int, share: float = 0.95) -> dict[str, tuple[float, float]]:
@@ -19,8 +21,10 @@ def intervals(ladder: Ladder, replicates: int, share: float = 0.95) -> dict[str,
     problem, fit = ladder.problem, ladder.best
     blocks, block = np.unique(problem.block, return_inverse=True)
     draws = np.random.default_rng(SEED).integers(len(blocks), size=(replicates, len(blocks)))
-    weights = np.stack([problem.weights * np.bincount(draw, minlength=len(blocks))[block] for draw in draws])
-    found = _reflectance(ladder, fit, weights) if problem.surface else _slopes(ladder, fit, weights)
+    drawn = np.stack([np.bincount(draw, minlength=len(blocks)) for draw in draws])
+    solve, several = _reflectance if problem.surface else _slopes, max(AT_ONCE // problem.size, 1)
+    parts = [drawn[start : start + several] for start in range(0, replicates, several)]
+    found = np.concatenate([solve(ladder, fit, problem.weights * part[:, block]) for part in parts])
     zero = np.zeros((len(fit.theta),) * 2)
     values = [parameters.report(theta, zero, problem.parameters)[0] for theta in found]
     ends = (1 - share) / 2, (1 + share) / 2
