@@ -251,16 +251,19 @@ def unit(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
 
 
 @jax.custom_jvp
-def one_loop(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+def one_loop(*components: Scalar) -> tuple[Scalar, ...]:
     """The components as they are, all computed in the same pass over the points.
 
     XLA's loops on a CPU have one result each, so that components repeat what they share, or wait for it in memory; only
     a reduction may have several. Hence each becomes the larger of itself and -inf.
     """
-    lowest = jnp.asarray(-jnp.inf, x.dtype)
-    rows = [lax.pad(c[None], lowest, [(0, 1, 0)] + [(0, 0, 0)] * c.ndim) for c in jnp.broadcast_arrays(x, y, z)]
-    x, y, z = lax.reduce(rows, [lowest] * 3, lambda a, b: [lax.max(p, q) for p, q in zip(a, b, strict=True)], [0])
-    return x, y, z
+    lowest = jnp.asarray(-jnp.inf, components[0].dtype)
+    rows = [lax.pad(c[None], lowest, [(0, 1, 0)] + [(0, 0, 0)] * c.ndim) for c in components]
+
+    def larger(a, b):
+        return [lax.max(p, q) for p, q in zip(a, b, strict=True)]
+
+    return tuple(lax.reduce(rows, [lowest] * len(rows), larger, [0]))
 
 
 @one_loop.defjvp

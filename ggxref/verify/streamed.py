@@ -6,6 +6,7 @@ from functools import partial
 import jax.numpy as jnp
 import numpy as np
 
+from ggxref import stable
 from ggxref.verify import cases, engine, montecarlo
 from ggxref.verify.batch import Batched
 from ggxref.verify.statistics import FALSE_ALARM, unlikely_difference
@@ -32,8 +33,8 @@ def over_normals(density: Callable, A: np.ndarray) -> Callable:
         p = x - jnp.copysign(fold, x), y - jnp.copysign(fold, y), z
         # Written out: a matrix product is neither fused nor float32 on every device.
         q = [A[0, k] * p[0] + A[1, k] * p[1] + A[2, k] * p[2] for k in range(3)]
-        length = jnp.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
-        return area * density(jnp.stack([c / length for c in q])) / (length * length * length)
+        *q, scale = stable.one_loop(*q, 1 / jnp.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]))
+        return area * density(jnp.stack([c * scale for c in q])) * (scale * scale * scale)
 
     return integrand
 
