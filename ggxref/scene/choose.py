@@ -100,6 +100,8 @@ def choose(scene: Scene, tolerance: float, say: Callable[[str], None] = lambda t
     if not visible:
         raise InputError(f"{scene.path}: view sees none of the shapes; there is nothing to choose for")
     say("the richest")
+    if not search.bright:
+        raise InputError(f"{scene.path}: no light reaches the view; there is no picture to keep")
     costs = {name: search.cost(name, search.richest[name]) for name in visible}
     steps = _steps(search)
     chosen, deviations = _together(search, _affordable(search, steps), steps)
@@ -242,4 +244,6 @@ def _fastest(
     faster = np.median(ratios, axis=0)
     best = int(faster.argmax())
     error = OF_MEDIAN * ratios[:, best].std(ddof=1) / math.sqrt(TURNS_OF_ALL)
-    return candidates[best], {"richest": pictures[0], "chosen": pictures[best]}, float(faster[best]), float(error)
+    # The whole pictures' own times are of one turn each.
+    timed = [replace(pictures[k], ns_per_sample=float(np.median(ns[:, k]))) for k in (0, best)]
+    return candidates[best], dict(zip(("richest", "chosen"), timed, strict=True)), float(faster[best]), float(error)

@@ -54,6 +54,11 @@ class Search:
         pixels = self.scene.width * self.scene.height * COUNT
         return min(max(int(self.scene.seconds * 1e9 / (ns * pixels)), 2), MOST // pixels)
 
+    @property
+    def bright(self) -> bool:
+        """Whether the richest picture has any light."""
+        return bool(self._reference(self.samples).mean.any())
+
     def _reference(self, samples: int) -> Batches:
         if samples not in self._references:
             self._references[samples] = self._batches(self.richest, samples)
