@@ -231,12 +231,15 @@ def fit(
 
     for option, path in (("--json", json), ("--figure", figure), ("--table", table)):
         writable(option, path)
+    if nearest and not export:
+        raise InputError("--nearest is for --export: what is closest, if that renderer cannot say the model")
     given = {"model": model, "tail": tail, "masking": masking, "fresnel": fresnel, "min_cosine": min_cosine}
     given |= {"samples": samples, "degree": level, "slopes": slopes, "smooth": smooth}
     given |= {"fixed": options.fixed(fix or []), "tolerance": tolerance}
     size = options.pixel(pixel)
     if table:
-        alone = [name for name, value in (("--json", json), ("--figure", figure), ("--export", export)) if value]
+        ones = ("--json", json), ("--figure", figure), ("--export", export), ("--bootstrap", bootstrap)
+        alone = [name for name, value in ones if value]
         if alone:
             raise InputError(f"{alone[0]} is for one FILE; --table is for many")
         with _progress("files", len(files)) as advance:

@@ -66,6 +66,43 @@ def test_it_goes_on_where_it_stopped(rows, folder, monkeypatch):
     assert fitted == [folder / "new.csv"]
 
 
+def test_what_was_done_before_an_interruption_is_kept(rows, folder, monkeypatch):
+    """Files of another kind than those that were being fitted have their rows already."""
+    real = many.fitting.fit_prepared
+
+    def interrupted(several):
+        if len(several) == 2:
+            raise KeyboardInterrupt
+        return real(several)
+
+    surface = fit_data.write(folder / "surface.x3p", fit_data.x3p(fit_data.rough_surface()))
+    paths, table = [surface, folder / "0.csv", folder / "1.csv", folder / "bad.csv"], folder / "stopped.csv"
+    monkeypatch.setattr(many.fitting, "fit_prepared", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        many.fit_files(paths, table, OPTIONS, None, lambda _: None)
+    with table.open(newline="") as stream:
+        assert [row["file"] for row in csv.DictReader(stream)] == [str(surface), str(folder / "bad.csv")]
+
+
+def test_rows_of_other_files_stay(rows, folder):
+    table = folder / "fits.csv"
+    many.fit_files([folder / "1.csv"], table, OPTIONS, None, lambda _: None)
+    with table.open(newline="") as stream:
+        assert {row["file"] for row in csv.DictReader(stream)} == {row["file"] for row in rows}
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--table", "t.csv", "--bootstrap", "10"], "--bootstrap is for one FILE"),
+        (["--nearest"], "--nearest is for --export"),
+    ],
+)
+def test_options_that_would_do_nothing_are_refused(folder, options, said):
+    result = CliRunner().invoke(app, ["fit", str(folder / "0.csv"), *options])
+    assert result.exit_code == 2 and said in result.output
+
+
 def test_another_table_is_not_overwritten(folder):
     other = fit_data.write(folder / "other.csv", "a,b\n1,2\n")
     result = CliRunner().invoke(app, ["fit", str(folder / "0.csv"), "--table", str(other)])

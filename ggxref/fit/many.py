@@ -17,7 +17,9 @@ from ggxref.fit.fitting import Ladder
 from ggxref.fit.preparation import Options, Prepared, prepare
 
 BATCH = 16
-"""Files side by side; after each batch the table is written."""
+"""Files side by side; the table is written after those of them that are of a kind."""
+Done = list[tuple[Path, dict[str, str]]]
+"""Files and their rows."""
 FIRST = ("file", "sha256", "options", "status", "model", "samples", "log_rmse", "loss", "next_model", "next_gain")
 
 
@@ -28,7 +30,9 @@ def fit_files(
     pixel: tuple[float, float] | None,
     advance: Callable[[int], None],
 ) -> list[dict[str, str]]:
-    """Fit every file, and write one row each to the CSV `table`; rows that it already has of the same bytes and options stay."""
+    """Fit every file, and write one row each to the CSV `table`; rows that it already has of the same bytes and options stay, and so
+    do those of other files.
+    """
     digest = sha256(json.dumps([asdict(options), pixel], sort_keys=True).encode()).hexdigest()[:12]
     done = {row["file"]: row for row in _read(table)}
     for batch in _batches(paths):
@@ -38,14 +42,20 @@ def fit_files(
             if old and old["options"] == digest and old["sha256"] == _sha256(path):
                 continue
             fresh.append(path)
-        for path, row in _rows(fresh, options, pixel):
-            done[str(path)] = {"file": str(path), "sha256": _sha256(path), "options": digest} | row
-        if fresh:
-            _write(table, [done[str(path)] for path in paths if str(path) in done])
-        advance(len(batch))
-    rows = [done[str(path)] for path in paths]
-    _write(table, rows)
-    return rows
+        advance(len(batch) - len(fresh))
+        for several in _rows(fresh, options, pixel):
+            for path, row in several:
+                done[str(path)] = {"file": str(path), "sha256": _sha256(path), "options": digest} | row
+            _write(table, _ordered(done, paths))
+            advance(len(several))
+    _write(table, _ordered(done, paths))
+    return [done[str(path)] for path in paths]
+
+
+def _ordered(done: dict[str, dict[str, str]], paths: Sequence[Path]) -> list[dict[str, str]]:
+    """The rows of these files, in their order, then the others."""
+    first = {str(path): done[str(path)] for path in paths if str(path) in done}
+    return list((first | done).values())
 
 
 def _batches(paths: Sequence[Path]) -> Iterator[Sequence[Path]]:
@@ -59,32 +69,32 @@ def _sha256(path: Path) -> str:
         return ""
 
 
-def _rows(
-    paths: Sequence[Path], options: Options, pixel: tuple[float, float] | None
-) -> Iterator[tuple[Path, dict[str, str]]]:
+def _rows(paths: Sequence[Path], options: Options, pixel: tuple[float, float] | None) -> Iterator[Done]:
+    """First the files that cannot be read, then one kind after the other."""
+    bad: Done = []
     kinds: dict[tuple, list[tuple[Path, Prepared]]] = {}
     for path in paths:
         try:
             prepared = prepare(readers.read(path, pixel=pixel), options)
         except InputError as error:
-            yield path, {"status": f"error: {error}"}
+            bad.append((path, {"status": f"error: {error}"}))
             continue
         kinds.setdefault(prepared.kind, []).append((path, prepared))
+    if bad:
+        yield bad
     for several in kinds.values():
-        yield from _fitted(several)
+        yield _fitted(several)
 
 
-def _fitted(several: Sequence[tuple[Path, Prepared]]) -> Iterator[tuple[Path, dict[str, str]]]:
+def _fitted(several: Sequence[tuple[Path, Prepared]]) -> Done:
     """The rows of files of one kind; where their common work fails, of each by itself."""
     try:
         ladders = fitting.fit_prepared([prepared for _, prepared in several])
-        yield from [(path, _row(ladder)) for (path, _), ladder in zip(several, ladders, strict=True)]
+        return [(path, _row(ladder)) for (path, _), ladder in zip(several, ladders, strict=True)]
     except (InputError, ArithmeticError, ValueError) as error:
         if len(several) == 1:
-            yield several[0][0], {"status": f"error: {error}"}
-            return
-        for each in several:
-            yield from _fitted([each])
+            return [(several[0][0], {"status": f"error: {error}"})]
+        return [row for each in several for row in _fitted([each])]
 
 
 def _row(ladder: Ladder) -> dict[str, str]:
