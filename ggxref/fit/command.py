@@ -58,7 +58,8 @@ def _listing(rows: Sequence[dict[str, str]]) -> Table:
     for name in ("file", "status", "model", "log_rmse", "loss"):
         table.add_column(name)
     for row in rows:
-        table.add_row(*(row.get(name, "") for name in ("file", "status", "model", "log_rmse", "loss")))
+        # The whole path, which a terminal has no room for, is in the CSV.
+        table.add_row(Path(row["file"]).name, *(row.get(name, "") for name in ("status", "model", "log_rmse", "loss")))
     return table
 
 
