@@ -13,7 +13,7 @@ from ggxref.measure import advice, charts, maps, run, speed, tables, variance
 from ggxref.measure.variants import QUANTITIES
 
 
-def test_interleaved_runs_time_every_subject_equally_often_and_tell_fast_from_slow():
+def test_turns_time_every_subject_equally_often_and_tell_fast_from_slow():
     calls = {"short": 0, "long": 0}
 
     def work(name, n):
@@ -25,7 +25,8 @@ def test_interleaved_runs_time_every_subject_equally_often_and_tell_fast_from_sl
         "long": lambda: work("long", 1 << 20),
     }
     short, long = speed.interleaved(subjects, 1, seconds=0.05)
-    assert calls["short"] == calls["long"] == short.runs + 1
+    assert short.runs == long.runs >= 5  # turns
+    assert calls["short"] > calls["long"] > long.runs  # each as many calls as its turn holds
     assert short.median < long.median
     assert long.best <= long.lower <= long.median <= long.upper
 

@@ -1,4 +1,4 @@
-"""Time of functions side by side: interleaved runs, so that a busy machine slows them all alike; a copy as the roof.
+"""Time of functions side by side: in turns, so that a busy machine slows them all alike; a copy as the roof.
 
 A subject is a call without arguments that returns when its result is there.
 """
@@ -18,7 +18,7 @@ from ggxref.measure.regions import REGIONS, rounded
 
 @dataclass(frozen=True)
 class Timing:
-    """Nanoseconds a point: median, quartiles and minimum of interleaved runs; compilation in seconds."""
+    """Nanoseconds a point: median, quartiles and minimum over the turns; compilation in seconds."""
 
     subject: str
     points: int
@@ -67,8 +67,8 @@ SETTLE = 0.01
 """Seconds: ten times the call that a kernel makes at 2^18 points."""
 
 
-def _turn(call: Callable[[], object]) -> list[float]:
-    """Seconds of each call of a turn, which lasts as long again as the subject had to settle."""
+def _turn(call: Callable[[], object]) -> float:
+    """Seconds of a call, the median of a turn that lasts as long again as the subject had to settle."""
     taken: list[float] = []
     settled = time.perf_counter() + SETTLE
     while not taken or time.perf_counter() < settled + SETTLE:
@@ -76,7 +76,7 @@ def _turn(call: Callable[[], object]) -> list[float]:
         call()
         if start >= settled:
             taken.append(time.perf_counter() - start)
-    return taken
+    return float(np.median(taken))
 
 
 def interleaved(
@@ -95,11 +95,10 @@ def interleaved(
         call()
     order, rng = list(subjects), np.random.default_rng(0)
     times: dict[str, list[float]] = {name: [] for name in subjects}
-    end, rounds = time.perf_counter() + seconds, 0
-    while time.perf_counter() < end or rounds < 5:
-        rounds += 1
+    end = time.perf_counter() + seconds
+    while time.perf_counter() < end or len(next(iter(times.values()))) < 5:
         for name in rng.permutation(order).tolist():
-            times[name] += [t / points * 1e9 for t in _turn(subjects[name])]
+            times[name].append(_turn(subjects[name]) / points * 1e9)
     rows = []
     for name, t in times.items():
         lower, median, upper = np.quantile(t, [0.25, 0.5, 0.75])

@@ -1,0 +1,68 @@
+"""What do large arrays cost beyond their kernel? The cap sampler at 2²² points, with fresh memory for each result and with kept memory.
+
+    python experiments/page_faults.py
+
+Above 32 MB glibc asks the operating system for each array anew, a page at a time. The environment is read when a process
+starts, hence one process for each setting. "donated": the result takes the place of ω_i.
+"""
+
+import os
+import resource
+import subprocess
+import sys
+
+import jax
+
+from ggxref.measure import peers, speed
+from ggxref.sampling import spherical_cap
+
+POINTS = 1 << 22
+SETTINGS = (
+    {},
+    {"GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"},  # pages of 2 MB
+    {"MALLOC_MMAP_THRESHOLD_": str(1 << 32), "MALLOC_TRIM_THRESHOLD_": str(1 << 33)},  # keep what was freed
+)
+
+
+def in_place(args):
+    """A subject whose result is its next argument."""
+    u, wi, alpha = args
+    program = jax.jit(jax.vmap(spherical_cap.sample, (-1, -1, None), -1), donate_argnums=1)
+    kept = [wi.copy()]
+
+    def call():
+        kept[0] = jax.block_until_ready(program(u, kept[0], alpha))
+
+    return call
+
+
+def faults(call) -> float:
+    """Pages that the kernel maps in one call, of four."""
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    for _ in range(4):
+        call()
+    return (resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before) / 4
+
+
+def main():
+    args = speed.inputs(("u", "wi", "alpha"), POINTS)
+    subjects = {
+        "fresh": speed.subject(spherical_cap.sample, args)[0],
+        "donated": in_place(args),
+        "copy": speed.copy(args),
+    }
+    subjects |= {name: call for name, call in peers.mitsuba(POINTS).items() if name == "mitsuba sample"}
+    for t in speed.interleaved(subjects, POINTS, seconds=10):
+        pages = faults(subjects[t.subject])
+        print(
+            f"  {t.subject:15s} {t.median:5.1f} ns [{t.lower:.1f}, {t.upper:.1f}], {pages:.0f} pages a call", flush=True
+        )
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1:
+        main()
+    else:
+        for settings in SETTINGS:
+            print(" ".join(f"{name}={value}" for name, value in settings.items()) or "defaults", flush=True)
+            subprocess.run([sys.executable, __file__, "here"], env=os.environ | settings, check=True)
