@@ -47,7 +47,7 @@ def faults(call) -> float:
 def main():
     args = speed.inputs(("u", "wi", "alpha"), POINTS)
     subjects = {
-        "fresh": speed.subject(spherical_cap.sample, args)[0],
+        "fresh": speed.subject(spherical_cap.sample, args),
         "donated": in_place(args),
         "copy": speed.copy(args),
     }

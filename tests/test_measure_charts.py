@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from ggxref.cli import app
 from ggxref.measure import advice, charts, maps, run, speed, tables, variance
 from ggxref.measure.variants import QUANTITIES
+from ggxref.sampling import spherical_cap
 
 
 def test_turns_time_every_subject_equally_often_and_tell_fast_from_slow():
@@ -36,6 +37,14 @@ def test_a_compiled_subject_knows_its_compilation_time():
     rows = speed.throughput(forms, 256, seconds=0.01)
     assert [r.subject for r in rows] == [*forms, "copy"]
     assert all(r.compilation > 0 for r in rows[:2]) and rows[2].compilation == 0
+
+
+def test_a_compiled_subject_knows_its_memory():
+    """A sampler that writes three components before it scales them holds 12 bytes a point; one product holds none."""
+    args = speed.inputs(("u", "wi", "alpha"), 1 << 14)
+    assert speed.subject(spherical_cap.sample, args).memory == pytest.approx(12, rel=0.01)
+    product = speed.subject(lambda u, wi, alpha: u[0] * wi[2], args).memory
+    assert product is not None and product < 0.1
 
 
 def _pieces(points):

@@ -18,7 +18,8 @@ from ggxref.measure.regions import REGIONS, rounded
 
 @dataclass(frozen=True)
 class Timing:
-    """Nanoseconds a point: median, quartiles and minimum over the turns; compilation in seconds."""
+    """Nanoseconds a point: median, quartiles and minimum over the turns; compilation in seconds; bytes a point of
+    intermediate results at the peak, beyond arguments and result (None: not known)."""
 
     subject: str
     points: int
@@ -27,7 +28,20 @@ class Timing:
     upper: float
     best: float
     compilation: float
+    memory: float | None
     runs: int
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A subject that XLA compiled, in `seconds`; `memory` as in `Timing`."""
+
+    run: Callable[[], object]
+    seconds: float
+    memory: float | None
+
+    def __call__(self) -> object:
+        return self.run()
 
 
 def machine() -> str:
@@ -47,14 +61,18 @@ def inputs(names: Iterable[str], points: int, dtype: str = "f32", *, isotropic: 
         return [jax.device_put(drawn[name]) for name in names]
 
 
-def subject(function: Callable, args: list, dtype: str = "f32") -> tuple[Callable[[], object], float]:
-    """A jitted `function`, mapped over the last axis of all `args` but "alpha", and the seconds of its compilation."""
-    axes = tuple(None if name == "alpha" else -1 for name in arguments(function))
+def subject(function: Callable, args: list, dtype: str = "f32") -> Compiled:
+    """A jitted `function`, mapped over the last axis of all `args` but "alpha"."""
+    names = arguments(function)
+    axes = tuple(None if name == "alpha" else -1 for name in names)
     with jax.enable_x64(dtype == "f64"):
         start = time.perf_counter()
         program = jax.jit(jax.vmap(function, in_axes=axes, out_axes=-1)).lower(*args).compile()
         seconds = time.perf_counter() - start
-    return lambda: jax.block_until_ready(program(*args)), seconds
+    points = max(arg.shape[-1] for arg in args)
+    sizes = program.memory_analysis()
+    memory = sizes.temp_size_in_bytes / points if sizes else None
+    return Compiled(lambda: jax.block_until_ready(program(*args)), seconds, memory)
 
 
 def copy(args: list) -> Callable[[], object]:
@@ -84,7 +102,6 @@ def interleaved(
     points: int,
     *,
     seconds: float = 2.0,
-    compilation: dict[str, float] | None = None,
 ) -> list[Timing]:
     """Run all subjects in turns, again and again, for about `seconds` in all (at least 5 rounds).
 
@@ -102,8 +119,9 @@ def interleaved(
     rows = []
     for name, t in times.items():
         lower, median, upper = np.quantile(t, [0.25, 0.5, 0.75])
-        compiled = (compilation or {}).get(name, 0.0)
-        rows.append(Timing(name, points, float(median), float(lower), float(upper), float(min(t)), compiled, len(t)))
+        made = subjects[name]
+        known = (made.seconds, made.memory) if isinstance(made, Compiled) else (0.0, None)
+        rows.append(Timing(name, points, float(median), float(lower), float(upper), float(min(t)), *known, len(t)))
     return rows
 
 
@@ -119,7 +137,5 @@ def throughput(
     """Time named one-point functions of the same arguments on the same points, beside a copy and `peers`."""
     names = arguments(next(iter(functions.values())))
     args = inputs(names, points, dtype, isotropic=isotropic)
-    made = {name: subject(f, args, dtype) for name, f in functions.items()}
-    subjects: dict[str, Callable[[], object]] = {name: call for name, (call, _) in made.items()}
-    subjects |= {"copy": copy(args)} | (peers or {})
-    return interleaved(subjects, points, seconds=seconds, compilation={n: s for n, (_, s) in made.items()})
+    subjects: dict[str, Callable[[], object]] = {name: subject(f, args, dtype) for name, f in functions.items()}
+    return interleaved(subjects | {"copy": copy(args)} | (peers or {}), points, seconds=seconds)

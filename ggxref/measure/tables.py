@@ -92,18 +92,18 @@ def _pareto(name, points) -> Rows:
                 "ns_lower": times[form].lower,
                 "ns_upper": times[form].upper,
                 "compilation": times[form].compilation,
+                "memory": times[form].memory,
             }
         )
     return rows
 
 
 def _interleaved(forms, isotropic):
-    size, subjects, compilation = 1 << 16, {}, {}
+    size, subjects = 1 << 16, {}
     for form, (function, dtype) in forms.items():
         args = speed.inputs(speed.arguments(function), size, dtype, isotropic=isotropic)
-        subjects[form], compilation[form] = speed.subject(function, args, dtype)
-    timed = speed.interleaved(subjects, size, seconds=2, compilation=compilation)
-    return {t.subject: t for t in timed}
+        subjects[form] = speed.subject(function, args, dtype)
+    return {t.subject: t for t in speed.interleaved(subjects, size, seconds=2)}
 
 
 def pareto(points: int) -> Pieces:

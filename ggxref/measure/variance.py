@@ -99,5 +99,5 @@ def times(points: int = 1 << 16, seconds: float = 4.0) -> dict[str, float]:
 
     _, wi, alpha = speed.inputs(("u", "wi", "alpha"), points)
     u = jnp.asarray(np.random.default_rng(0).random((3, points)), jnp.float32)
-    subjects = {name: speed.subject(whole(s), [u, wi, alpha])[0] for name, s in SAMPLERS.items()}
+    subjects = {name: speed.subject(whole(s), [u, wi, alpha]) for name, s in SAMPLERS.items()}
     return {t.subject: t.best for t in speed.interleaved(subjects, points, seconds=seconds)}
