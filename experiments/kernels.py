@@ -11,7 +11,9 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from ggxref import masking, ndf
+import jax.numpy as jnp
+
+from ggxref import masking, ndf, stable
 from ggxref.files import write_atomically
 from ggxref.measure import peers, speed
 from ggxref.measure.accuracy import measure
@@ -19,16 +21,24 @@ from ggxref.measure.reference import REFERENCES
 from ggxref.measure.regions import REGIONS
 from ggxref.measure.variants import QUANTITIES
 from ggxref.sampling import bounded_cap, cross_section, spherical_cap
+from ggxref.sampling._sphere import half_in_cap, ray
 
 MARKS = "<!-- kernels: experiments/kernels.py -->\n", "<!-- end kernels -->\n"
 SIZES = (1 << 16, 1 << 18, 1 << 20)
 POINTS = 1 << 15
 
 
+def cap_apart(u, wi, alpha):
+    """The cap sampler without `stable.one_loop`: the compiler makes a loop of each component."""
+    x, y, z = half_in_cap(u, ray(alpha[0] * wi[0], alpha[1] * wi[1], wi[2]), 0)
+    return jnp.stack(stable.unit(alpha[0] * x, alpha[1] * y, z))
+
+
 # Kernel, Mitsuba's of the same, the name of its reference; all of a group take the same arguments.
 GROUPS = (
     {
         "spherical_cap.sample": (spherical_cap.sample, "mitsuba sample", "sampling.spherical_cap.sample"),
+        "the same, components apart": (cap_apart, "mitsuba sample", "sampling.spherical_cap.sample"),
         "bounded_cap.sample": (bounded_cap.sample, "mitsuba sample", "sampling.bounded_cap.sample"),
         "cross_section.sample": (cross_section.sample, "mitsuba sample", "sampling.cross_section.sample"),
     },
