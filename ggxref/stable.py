@@ -251,6 +251,7 @@ def unit(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
 
 
 @jax.custom_jvp
+@_traced_once
 def one_loop(*components: Scalar) -> tuple[Scalar, ...]:
     """The components as they are, all computed in the same pass over the points.
 
