@@ -4,6 +4,7 @@
     python experiments/fit_speed.py ladder --materials 100
 
 The comparison is fair on one core without BLAS's threads alone: waiting for each other they take twice SciPy's processor time.
+JAX is set as `ggxref fit` sets it. `--asynchronous` leaves it as it is in a program that calls `ggxref.fit.fit` itself.
 """
 
 import argparse
@@ -19,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 import fit_data
 
-from ggxref.fit import lobes, parameters
+from ggxref.fit import command, lobes, parameters
 from ggxref.fit.data import Reflectance, Source, direction
 from ggxref.fit.fitting import fit_prepared
 from ggxref.fit.preparation import Options, prepare
@@ -110,7 +111,10 @@ def main() -> None:
     parser.add_argument("part", choices=("scipy", "ladder"))
     parser.add_argument("--materials", type=int, default=100)
     parser.add_argument("--samples", type=int, default=10_000)
+    parser.add_argument("--asynchronous", action="store_true")
     given = parser.parse_args()
+    if not given.asynchronous:
+        command.run_calls_where_they_are_made()
     if given.part == "scipy":
         beside_scipy(measured(given.samples, 0))
         return

@@ -233,6 +233,7 @@ def fit(
         writable(option, path)
     if nearest and not export:
         raise InputError("--nearest is for --export: what is closest, if that renderer cannot say the model")
+    command.run_calls_where_they_are_made()
     given = {"model": model, "tail": tail, "masking": masking, "fresnel": fresnel, "min_cosine": min_cosine}
     given |= {"samples": samples, "degree": level, "slopes": slopes, "smooth": smooth}
     given |= {"fixed": options.fixed(fix or []), "tolerance": tolerance}

@@ -5,6 +5,7 @@ from json import dumps
 from pathlib import Path
 from typing import NamedTuple
 
+import jax
 from rich.console import Console
 from rich.table import Table
 
@@ -22,6 +23,14 @@ class Outputs(NamedTuple):
     export: str | None
     nearest: bool
     replicates: int
+
+
+def run_calls_where_they_are_made() -> None:
+    """No other thread takes the compiled calls over, which costs more than a small one takes: `rows.each` has threads enough.
+
+    It must come before the first of them, and is a program's to set, not a library's.
+    """
+    jax.config.update("jax_cpu_enable_async_dispatch", False)
 
 
 def one(file: Path, given: dict, pixel: tuple[float, float] | None, outputs: Outputs) -> bool:
