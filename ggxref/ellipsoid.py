@@ -7,8 +7,9 @@ orthogonal give one distribution of normals. `size` is $C_e$ (walter2014 §2.4);
 import math
 
 import jax.numpy as jnp
+from jax import lax
 
-from ggxref import stable
+from ggxref import _pairs, stable
 from ggxref._types import Mat2, Mat3, Real, Scalar, Vec2, Vec3
 
 
@@ -18,16 +19,26 @@ def times(A: Mat3, x: Real, y: Real, z: Real) -> tuple[Scalar, Scalar, Scalar]:
     return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
 
 
+def times_exactly(A: Mat3, w: Vec3) -> tuple[Scalar, Scalar, Scalar]:
+    """`A w`, each component rounded once: under skew and strong anisotropy the plain sums cancel."""
+    x, y, z = map(_pairs.rounded, _pairs.times(A, tuple(w)))
+    return x, y, z
+
+
 def cofactor(A: Mat3) -> tuple[Mat3, Scalar]:
     r"""The cofactor matrix $\det(A)\,A^{-T}$ and $\det A$, without a division: (3, 3) and ().
 
     The rows of a smooth or skewed `A` are nearly parallel: plain minors would lose the digits that they share, once each,
     and the determinant twice.
     """
-    # The minor (i, j) takes the rows i + 1 and i + 2 and the columns j + 1 and j + 2, around the corner.
-    E = jnp.tile(A, (2, 2))
-    rows = stable.dot((E[1:4, 1:4], E[1:4, 2:5]), (E[2:5, 2:5], -E[2:5, 1:4]))
-    return rows, stable.dot(A[0], rows[0])
+    minors = _pairs.cofactor(A)
+    det = _pairs.rounded(_pairs.dot_of_pairs(minors[0], tuple(A[0])))
+    return jnp.stack([jnp.stack([_pairs.rounded(p) for p in row]) for row in minors]), det
+
+
+def determinant(A: Mat3) -> Scalar:
+    """det A, rounded once."""
+    return _pairs.rounded(_pairs.determinant(A))
 
 
 @stable.widened
@@ -110,7 +121,37 @@ def sggx(A: Mat3) -> Mat3:
 @stable.widened
 def size(A: Mat3) -> Scalar:
     r"""The $C_e$ that gives unit projected area along n: $\sqrt{|\det A| / (\pi \|A n\|)}$. walter2014 (29)."""
-    return jnp.sqrt(jnp.abs(cofactor(A)[1]) / (math.pi * length(*A[:, 2])))
+    return jnp.sqrt(jnp.abs(determinant(A)) / (math.pi * length(*A[:, 2])))
+
+
+def _reciprocal_scale(x):
+    """A power of two near 1/|x|: a factor that rounds nothing."""
+    integer = jnp.int32 if x.dtype == jnp.float32 else jnp.int64
+    one, infinity = (lax.bitcast_convert_type(jnp.asarray(c, x.dtype), integer) for c in (1, jnp.inf))
+    # By its exponent's bits: a division, which XLA computes once for all its uses, would cut the expression in pieces.
+    scale = 2 * one - (lax.bitcast_convert_type(x, integer) & infinity)
+    return lax.stop_gradient(lax.bitcast_convert_type(scale, x.dtype))
+
+
+def inverse_square(wm: Vec3, A: Mat3) -> tuple[Scalar, Scalar]:
+    r"""$\|A^{-T}\omega_m\|^2/\|\omega_m\|^2$ and $|\det A|$, each rounded once; the first's derivative is that of the numerator.
+
+    Under skew $\mathrm{cof}(A)\,\omega_m$ cancels at the peak of the density: minors and product are in two words.
+    """
+    w, minors = tuple(wm), _pairs.cofactor(A)
+    det = _pairs.dot_of_pairs(minors[0], tuple(A[0]))
+    # Divided before they are squared: cof m is α² at the peak.
+    scale = _reciprocal_scale(det[0])
+    d, d_rest = det[0] * scale, det[1] * scale
+    image = [(x * scale, rest * scale) for x, rest in (_pairs.dot_of_pairs(row, w) for row in minors)]
+    x, y, z = (x for x, _ in image)
+    total, rest = _pairs.dot((x, y, z), (x, y, z))
+    rest = rest + 2 * (x * image[0][1] + y * image[1][1] + z * image[2][1])
+    longer = 2 * lax.stop_gradient(stable.excess(wm))
+    square = jnp.where(longer > -1, 1 + longer, 1)  # ‖w‖², but for the zero vector
+    d_square, d_square_rest = _pairs.dot((d,), (d,))
+    smaller = (d_square_rest + 2 * d * d_rest) / d_square + longer / square
+    return (total + (rest - total * smaller)) / d_square, jnp.abs(_pairs.rounded(det))
 
 
 @stable.widened
@@ -121,10 +162,8 @@ def gaussian_curvature(wm: Vec3, A: Mat3, size: Real) -> Scalar:
 
     walter2014 (20).
     """
-    cof, det = cofactor(A)
-    x, y, z = times(cof, *wm)
-    # |A|^2 |cof m / det|^4 = (|cof m|^2 / det)^2: no fourth power to underflow.
-    return ((x * x + y * y + z * z) / det / size) ** 2
+    q, det = inverse_square(wm, A)
+    return (det * q / size) ** 2
 
 
 @stable.widened
@@ -135,23 +174,25 @@ def projected_area(w: Vec3, A: Mat3, size: Real) -> Scalar:
 
     walter2014 (26).
     """
-    return math.pi * size**2 * length(*times(A, *w)) / jnp.abs(cofactor(A)[1])
+    return math.pi * size**2 * length(*times_exactly(A, w)) / jnp.abs(determinant(A))
 
 
-def lune_sum(u: Vec3, v: Vec3, A: Mat3) -> Scalar:
-    r"""$\|Au\|\|Av\| + Au\cdot Av$, the factor of every lune, exact also where $Au \approx -Av$.
+def _lune_sum(au, av):
+    r"""$\|Au\|\|Av\| + Au\cdot Av$, the factor of every lune, and $\|Av\|$; exact also where $Au \approx -Av$.
 
-    There the sum cancels, and $\|Au \times Av\|^2 / (\|Au\|\|Av\| - Au\cdot Av)$ does not; $Au \times Av$ is
-    $\mathrm{cof}(A)(u \times v)$ (walter2014 (25), printed with $M^T$ for $M^{-T}$).
+    There the sum cancels, and $\|Au \times Av\|^2 / (\|Au\|\|Av\| - Au\cdot Av)$ does not, of vectors in two words: rounded, they
+    would have lost the angle between them.
     """
-    au, av = times(A, *u), times(A, *v)
-    product = length(*au) * length(*av)
-    cosine = au[0] * av[0] + au[1] * av[1] + au[2] * av[2]
-    cross = times(cofactor(A)[0], *stable.cross(u, v))
-    square = cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]
-    obtuse = cosine < 0
-    # The inner `where` keeps the branch not taken away from 0/0 at u = v.
-    return jnp.where(obtuse, square / jnp.where(obtuse, product - cosine, 1), product + cosine)
+    u, v = ([_pairs.rounded(p) for p in a] for a in (au, av))
+    v_length = length(*v)
+    product = length(*u) * v_length
+    cosine = u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+    x, y, z = _pairs.cross_of_pairs(au, av)
+    # Down to 120° the sum keeps its digits. The inner `where` keeps the branch not taken away from 0/0 at u = v.
+    obtuse = cosine < -product / 2
+    return jnp.where(
+        obtuse, (x * x + y * y + z * z) / jnp.where(obtuse, product - cosine, 1), product + cosine
+    ), v_length
 
 
 @stable.widened
@@ -163,8 +204,8 @@ def lune_area(u: Vec3, v: Vec3, A: Mat3, size: Real) -> Scalar:
 
     walter2014 (28).
     """
-    det = jnp.abs(cofactor(A)[1])
-    return math.pi * size**2 * lune_sum(u, v, A) / (2 * det * length(*times(A, *v)))
+    total, v_length = _lune_sum(_pairs.times(A, tuple(u)), _pairs.times(A, tuple(v)))
+    return math.pi * size**2 * total / (2 * jnp.abs(determinant(A)) * v_length)
 
 
 def mean_normal(A: Mat3) -> Vec3:
@@ -181,6 +222,7 @@ def sigma(w: Vec3, A: Mat3) -> Scalar:
 
     walter2014 (26), (28).
     """
-    n = jnp.zeros_like(w).at[2].set(1)
-    a = A[:, 2]
-    return lune_sum(w, n, A) / (2 * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]))
+    x, y, z = A[:, 2]
+    zero = jnp.zeros_like(z)
+    total, _ = _lune_sum(_pairs.times(A, tuple(w)), ((x, zero), (y, zero), (z, zero)))
+    return total / (2 * (x * x + y * y + z * z))

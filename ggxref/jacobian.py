@@ -4,7 +4,7 @@ import jax.numpy as jnp
 
 from ggxref import stable
 from ggxref._types import Mat3, Real, Scalar, Vec3
-from ggxref.ellipsoid import cofactor, length, times
+from ggxref.ellipsoid import determinant, length, times_exactly
 
 
 def reflection(wo: Vec3, wm: Vec3) -> Scalar:
@@ -49,5 +49,5 @@ def linear(wm: Vec3, M: Mat3) -> Scalar:
 
     dupuy2023 (1), tokuyoshi2024 (18).
     """
-    image = length(*times(M, *wm))
-    return jnp.abs(cofactor(M)[1]) / (image * image * image)
+    image = length(*times_exactly(M, wm))
+    return jnp.abs(determinant(M)) / (image * image * image)

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from ggxref import stable
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
-from ggxref.ellipsoid import cofactor, length, times
+from ggxref.ellipsoid import inverse_square
 
 
 def hemisphere(wm: Vec3) -> Scalar:
@@ -86,11 +86,7 @@ def ellipsoid(wm: Vec3, A: Mat3) -> Scalar:
 
     walter2014 (1).
     """
-    cof, det = cofactor(A)
-    x, y, z = times(cof, *wm)
-    # Divide before the fourth power: |A|³/‖cof m‖⁴ is the same algebra, but at m = n that power is α⁸, which
-    # underflows float32 below α = 2e-5.
-    x, y, z = x / det, y / det, z / det
-    q = x * x + y * y + z * z
-    D = 1 / (math.pi * (jnp.abs(det) * q) * (length(*A[:, 2]) * q))
+    q, det = inverse_square(wm, A)
+    An = jnp.sqrt(stable.dot(A[:, 2], A[:, 2]))
+    D = 1 / (math.pi * (det * q) * (An * q))
     return jnp.where(wm[2] > 0, D, 0)

@@ -1,0 +1,86 @@
+"""Numbers as unevaluated sums of two of a dtype, `(value, rest)`, for sums that cancel twice over: A's minors, then what they
+are multiplied with. In components, which XLA fuses, where arrays of three would be stored.
+
+A rest has no derivative of its own: the value's is the whole one's. Value and rest have to meet within one fusion: in two,
+XLA computes the value twice, once contracted to FMAs and once not, and the rest belongs to one of them. Divisions with more
+than one use are what cuts an expression in pieces.
+"""
+
+import jax
+import jax.numpy as jnp
+from jax import lax
+
+from ggxref._types import Mat3, Scalar
+from ggxref.stable import _collected, _two_product
+
+Pair = tuple[Scalar, Scalar]
+Triple = tuple[Scalar, Scalar, Scalar]
+Pairs = tuple[Pair, Pair, Pair]
+
+
+@jax.custom_jvp
+def dot(a: tuple[Scalar, ...], b: tuple[Scalar, ...]) -> Pair:
+    """`a · b`: the rest leaves out only what is below the square of ε."""
+    value, errors = _collected([_two_product(x, y) for x, y in zip(a, b, strict=True)])
+    return value, sum(errors, jnp.zeros_like(value))
+
+
+@dot.defjvp
+def _dot_jvp(primals, tangents):
+    (a, b), (da, db) = primals, tangents
+    value, rest = dot(a, b)
+    change = sum((x * dy + dx * y for x, dx, y, dy in zip(a, da, b, db, strict=True)), jnp.zeros_like(value))
+    return (value, rest), (change, jnp.zeros_like(rest))
+
+
+def rounded(pair: Pair) -> Scalar:
+    """The sum, in one number."""
+    return pair[0] + pair[1]
+
+
+def rows(A: Mat3) -> tuple[Triple, Triple, Triple]:
+    """A matrix in components."""
+    (a, b, c), (d, e, f), (g, h, i) = A
+    return (a, b, c), (d, e, f), (g, h, i)
+
+
+def cross(a: Triple, b: Triple) -> Pairs:
+    """`a × b`."""
+    x, y, z = (dot((a[j], a[k]), (b[k], -b[j])) for j, k in ((1, 2), (2, 0), (0, 1)))
+    return x, y, z
+
+
+def cross_of_pairs(a: Pairs, b: Pairs) -> Triple:
+    """`a × b` of two-word vectors, rounded once: exact also where they are parallel but for half their digits."""
+
+    def component(j, k):
+        value, rest = dot((a[j][0], a[k][0]), (b[k][0], -b[j][0]))
+        return value + (rest + ((a[j][0] * b[k][1] + a[j][1] * b[k][0]) - (a[k][0] * b[j][1] + a[k][1] * b[j][0])))
+
+    return component(1, 2), component(2, 0), component(0, 1)
+
+
+def dot_of_pairs(a: Pairs, b: Triple) -> Pair:
+    """`a · b` of a two-word vector."""
+    value, rest = dot(tuple(hi for hi, _ in a), b)
+    rest = rest + (a[0][1] * b[0] + a[1][1] * b[1] + a[2][1] * b[2])
+    total = value + rest  # where the values cancel, the rest is as large
+    return total, lax.stop_gradient((value - total) + rest)
+
+
+def times(A: Mat3, w: Triple) -> Pairs:
+    """`A w`."""
+    x, y, z = (dot(row, w) for row in rows(A))
+    return x, y, z
+
+
+def cofactor(A: Mat3) -> tuple[Pairs, Pairs, Pairs]:
+    r"""The rows of $\det(A)\,A^{-T}$."""
+    a, b, c = rows(A)
+    return cross(b, c), cross(c, a), cross(a, b)
+
+
+def determinant(A: Mat3) -> Pair:
+    r"""$\det A$."""
+    a, b, c = rows(A)
+    return dot_of_pairs(cross(b, c), a)
