@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from ggxref._types import Mat3, Scalar
-from ggxref.stable import _collected, _two_product
+from ggxref.stable import _collected, _quotient, _two_product
 
 Pair = tuple[Scalar, Scalar]
 Triple = tuple[Scalar, Scalar, Scalar]
@@ -44,7 +44,7 @@ def rows(A: Mat3) -> tuple[Triple, Triple, Triple]:
     return (a, b, c), (d, e, f), (g, h, i)
 
 
-def cross(a: Triple, b: Triple) -> Pairs:
+def cross(a: tuple[Scalar, ...], b: tuple[Scalar, ...]) -> Pairs:
     """`a × b`."""
     x, y, z = (dot((a[j], a[k]), (b[k], -b[j])) for j, k in ((1, 2), (2, 0), (0, 1)))
     return x, y, z
@@ -84,3 +84,35 @@ def determinant(A: Mat3) -> Pair:
     r"""$\det A$."""
     a, b, c = rows(A)
     return dot_of_pairs(cross(b, c), a)
+
+
+@jax.custom_jvp
+def tangent_square(x: Scalar, y: Scalar, z: Scalar, ax: Scalar, ay: Scalar) -> Pair:
+    r"""$(x^2/\alpha_x^2 + y^2/\alpha_y^2)/z^2$, `z > 0`: an exponent, whose error is one of its exponential times as large."""
+    (p, p_rest), (q, q_rest) = _quotient(x, ax), _quotient(y, ay)
+    square, rest = dot((p, q), (p, q))
+    return _over((square, rest + 2 * (p * p_rest + q * q_rest)), dot((z,), (z,)))
+
+
+@tangent_square.defjvp
+def _tangent_square_jvp(primals, tangents):
+    (x, y, z, ax, ay), (dx, dy, dz, dax, day) = primals, tangents
+    value, rest = tangent_square(*primals)
+    p, q = x / (ax * z), y / (ay * z)
+    change = 2 * (p * (dx / ax - p * (z / ax) * dax) + q * (dy / ay - q * (z / ay) * day)) / z - 2 * value * (dz / z)
+    return (value, rest), (change, jnp.zeros_like(rest))
+
+
+def height_square(x: Scalar, y: Scalar, z: Scalar, ax: Scalar, ay: Scalar) -> Pair:
+    r"""$z^2/(\alpha_x^2 x^2 + \alpha_y^2 y^2)$, `x` and `y` not both 0: an exponent, without a derivative."""
+    (p, p_rest), (q, q_rest) = _two_product(ax, x), _two_product(ay, y)
+    square, rest = dot((p, q), (p, q))
+    value, rest = _over(dot((z,), (z,)), (square, rest + 2 * (p * p_rest + q * q_rest)))
+    return lax.stop_gradient(value), lax.stop_gradient(rest)
+
+
+def _over(a: Pair, b: Pair) -> Pair:
+    """The quotient; its rest is that of whatever the first division gave."""
+    value = a[0] / b[0]
+    product, error = _two_product(value, b[0])
+    return value, (((a[0] - product) - error) + (a[1] - value * b[1])) / b[0]

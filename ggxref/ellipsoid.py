@@ -64,6 +64,19 @@ def shape_matrix(alpha: Vec2, angles: Vec3) -> Mat3:
     return jnp.stack(rows)
 
 
+def canonical_terms(A: Mat3) -> tuple[Scalar, Scalar, Scalar, Scalar, Scalar]:
+    """The numbers of `canonical`: `(c00, c10, c11, ex, ey)`."""
+    a1, a2, a3 = (tuple(A[i, j] for i in range(3)) for j in range(3))
+    square = _pairs.rounded(_pairs.dot(a3, a3))
+    ex, ey = (_pairs.rounded(_pairs.dot(a, a3)) / square for a in (a1, a2))
+    # The parts of a1 and a2 perpendicular to a3 have the lengths |a1 x a3| / |a3| and so on.
+    n1, n2 = (tuple(map(_pairs.rounded, _pairs.cross(a, a3))) for a in (a1, a2))
+    n1_length = length(*n1)
+    c10 = _pairs.rounded(_pairs.dot(n1, n2)) / (n1_length * square)
+    c11 = jnp.abs(determinant(A)) / (n1_length * jnp.sqrt(square))
+    return n1_length / square, c10, c11, ex, ey
+
+
 @stable.widened
 def canonical(A: Mat3) -> Mat3:
     r"""The representative of `A`'s distribution with $A n = n$: $\begin{pmatrix} C^T & 0 \\ e^T & 1 \end{pmatrix}$.
@@ -74,19 +87,9 @@ def canonical(A: Mat3) -> Mat3:
     Gram–Schmidt from the third column on: $\Sigma = C C^T$ by subtraction, $S - e e^T$, loses the digits that a strong
     skew shares with `e`.
     """
-    a1, a2, a3 = A.T
-    a3_square = a3[0] * a3[0] + a3[1] * a3[1] + a3[2] * a3[2]
-    e = stable.dot(a1, a3) / a3_square, stable.dot(a2, a3) / a3_square
-    # The parts of a1 and a2 perpendicular to a3 have the lengths |a1 x a3| / |a3| and so on, and these cross products
-    # are cofactors.
-    cof, det = cofactor(A)
-    n1, n2 = -cof[:, 1], cof[:, 0]
-    n1_length = length(*n1)
-    c00 = n1_length / a3_square
-    c10 = stable.dot(n1, n2) / (n1_length * a3_square)
-    c11 = jnp.abs(det) / (n1_length * jnp.sqrt(a3_square))
+    c00, c10, c11, ex, ey = canonical_terms(A)
     zero, one = jnp.zeros_like(c00), jnp.ones_like(c00)
-    return jnp.stack([jnp.stack([c00, c10, zero]), jnp.stack([zero, c11, zero]), jnp.stack([*e, one])])
+    return jnp.stack([jnp.stack([c00, c10, zero]), jnp.stack([zero, c11, zero]), jnp.stack([ex, ey, one])])
 
 
 @stable.widened

@@ -42,6 +42,7 @@ def slope(wm: Vec3) -> Scalar:
     return 1 / wm[2] ** 3
 
 
+@stable.widened
 def linear(wm: Vec3, M: Mat3) -> Scalar:
     r"""$|\det M| / \|M\omega_m\|^3$: Jacobian of $\omega \mapsto M\omega/\|M\omega\|$, solid angle out over solid angle in.
 

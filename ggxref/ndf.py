@@ -8,7 +8,7 @@ import math
 
 import jax.numpy as jnp
 
-from ggxref import stable
+from ggxref import _pairs, stable
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import inverse_square
 
@@ -44,9 +44,11 @@ def beckmann(wm: Vec3, alpha: Vec2) -> Scalar:
     # Beyond this exponent D is 0 in the dtype; towards the horizon z⁴ then is 0 too, and D or its gradient 0/0.
     seen = (wm[2] > 0) & (rho < -2 * math.log(float(jnp.finfo(wm.dtype).tiny)) * z_square)
     z_square = jnp.where(seen, z_square, 1)
+    x, y, z = (jnp.where(seen, c, d) for c, d in zip(wm, (0.0, 0.0, 1.0), strict=True))
+    exponent, rest = _pairs.tangent_square(x, y, z, alpha[0], alpha[1])
     # Half the exponent twice: the peak 1/(π αx αy) reaches into tails where the exponential alone has underflowed.
-    half = jnp.exp(-rho / (2 * z_square))
-    D = half * (half / (math.pi * alpha[0] * z_square * (alpha[1] * z_square)))
+    half = jnp.exp(-exponent / 2)
+    D = half * (half * (1 - rest) / (math.pi * alpha[0] * z_square * (alpha[1] * z_square)))
     return jnp.where(seen, D, 0)
 
 

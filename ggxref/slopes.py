@@ -9,7 +9,7 @@ import math
 
 import jax.numpy as jnp
 
-from ggxref import stable
+from ggxref import _pairs, stable
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import canonical
 
@@ -96,7 +96,10 @@ def gaussian_tail(w, alpha):
     s = jnp.sqrt(jnp.where(square > 0, square, 1))
     # From 30 on, ierfc is 0 in every dtype; the limit only stops the overflow of z/s at normal incidence.
     a = jnp.minimum(jnp.abs(w[2]), 30 * s) / s
-    return s, jnp.where(square > 0, stable.ierfc(a), 0)
+    seen = (square > 0) & (a < 30)
+    x, z = jnp.where(seen, w[0], 1), jnp.where(seen, w[2], 1)
+    exponent, rest = _pairs.height_square(x, jnp.where(seen, w[1], 1), z, alpha[0], alpha[1])
+    return s, jnp.where(seen, stable.ierfc(a, (exponent, rest)), 0)
 
 
 @stable.widened

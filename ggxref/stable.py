@@ -370,20 +370,25 @@ def _ierfc_scaled(a):
 
 
 @jax.custom_jvp
-def ierfc(a: Real) -> Scalar:
+def _ierfc(a, square, rest):
+    return _ierfc_scaled(a) * (jnp.exp(-square) * (1 - rest))
+
+
+@_ierfc.defjvp
+def _ierfc_jvp(primals, tangents):
+    return _ierfc(*primals), -jax.scipy.special.erfc(primals[0]) * tangents[0]
+
+
+def ierfc(a: Real, square: tuple[Real, Real] | None = None) -> Scalar:
     r"""First repeated integral of erfc, $\int_a^\infty \mathrm{erfc} = e^{-a^2}/\sqrt\pi - a\,\mathrm{erfc}(a)$, for `a >= 0`.
 
     This is the shape of every Gaussian projected area: Beckmann's Λ is `ierfc(a) / (2 a)`. The two terms agree in all
     but $1/2a^2$ of themselves, hence a Chebyshev series (after Shepherd & Laframboise 1981) times the exponential.
+
+    - `square`: a² in two words: the rounding of `a` alone changes the exponential by 2a² times as much.
     """
     a = jnp.asarray(a)
-    return _ierfc_scaled(a) * jnp.exp(-a * a)
-
-
-@ierfc.defjvp
-def _ierfc_jvp(primals, tangents):
-    (a,), (da,) = primals, tangents
-    return ierfc(a), -jax.scipy.special.erfc(a) * da
+    return _ierfc(a, *(square or (a * a, jnp.zeros_like(a))))
 
 
 def gaussian_tails(a: Real) -> tuple[Scalar, Scalar]:

@@ -10,14 +10,14 @@ import jax.numpy as jnp
 
 from ggxref import ndf, stable
 from ggxref._types import Mat3, Scalar, Turn, Vec2, Vec3
-from ggxref.ellipsoid import canonical, cofactor, length, times
-from ggxref.sampling._sphere import half_in_cap
-from ggxref.sampling.ellipsoid_cap import from_sphere, to_sphere
+from ggxref.ellipsoid import canonical_terms, inverse_square, length
+from ggxref.sampling._half_vector import half_in_cap
+from ggxref.sampling.ellipsoid_cap import Canonical, from_sphere, to_sphere
 
 
-def _largest_q(wi, canonical_A):
+def _largest_q(wi: Vec3, A: Canonical):
     """c² and c² (max Q - 1) over [0, θ₁]: Q is a sinusoid of 2θ with one maximum in [0°, 90°]."""
-    (c00, c10, _), (_, c11, _), (ex, ey, _) = canonical_A
+    c00, c10, c11, ex, ey = A
     c = c00 * c11 * 2 / (length(c00 + c11, c10, 0) + length(c00 - c11, c10, 0))
     skew = length(ex, ey, 0)
     lift, gap = skew * skew, (1 - c) * (1 + c)
@@ -35,9 +35,10 @@ def _largest_q(wi, canonical_A):
     return c * c, jnp.where(b >= -amplitude * sin_i, peak, at_end)
 
 
-def _cut(wi, i, canonical_A):
-    c_square, q = _largest_q(wi, canonical_A)
-    return jnp.where(wi[2] > 0, wi[2] * c_square / (i.norm * (c_square + q)), 0)
+def _cut(wi, A):
+    """o'_z + i'_z at the cap's lower end, in units of ‖A ωi‖."""
+    c_square, q = _largest_q(wi, A)
+    return jnp.where(wi[2] > 0, wi[2] * (c_square / (c_square + q)), 0)
 
 
 @stable.widened
@@ -46,12 +47,12 @@ def bound(wi: Vec3, A: Mat3) -> Scalar:
 
     - `wi`: unit, (3,). `A`: shape matrix, (3, 3), non-singular.
     """
-    A = canonical(A)
-    i = to_sphere(wi, A)
-    c_square, q = _largest_q(wi, A)
+    terms = canonical_terms(A)
+    i = to_sphere(wi, terms)
+    c_square, q = _largest_q(wi, terms)
     # i_z/(‖Aωi‖ Q) − i'_z with i'_z = (e·ωi + i_z)/‖Aωi‖.
-    fall = A[2, 0] * wi[0] + A[2, 1] * wi[1] + wi[2] * (q / (c_square + q))
-    return jnp.where(wi[2] > 0, -fall / i.norm, -i.z)
+    fall = terms[3] * wi[0] + terms[4] * wi[1] + wi[2] * (q / (c_square + q))
+    return -jnp.where(wi[2] > 0, fall, i[2]) / length(*i)
 
 
 @stable.widened
@@ -62,9 +63,8 @@ def sample(u: Vec2, wi: Vec3, A: Mat3, *, turn: Turn = stable.cos_sin_turn) -> V
     - `turn`: the form of cos 2πu and sin 2πu.
     - `A`: shape matrix, (3, 3), non-singular. Returns a micronormal with density `pdf`: unit, (3,), above the horizon.
     """
-    A = canonical(A)
-    i = to_sphere(wi, A)
-    return from_sphere(*half_in_cap(u, i, _cut(wi, i, A), turn), A)
+    terms = canonical_terms(A)
+    return from_sphere(*half_in_cap(u, *to_sphere(wi, terms), _cut(wi, terms), turn), terms)
 
 
 @stable.widened
@@ -76,14 +76,16 @@ def pdf(wm: Vec3, wi: Vec3, A: Mat3) -> Scalar:
 
     tokuyoshi2024's p_bound, for the ellipsoid.
     """
-    A = canonical(A)
-    i = to_sphere(wi, A)
-    cosine = stable.cosine(wi, wm)
-    cof, det = cofactor(A)
-    x, y, z = times(cof, *wm)
-    q = (x / det) ** 2 + (y / det) ** 2 + (z / det) ** 2
-    cut = _cut(wi, i, A)
+    terms = canonical_terms(A)
+    x, y, z = to_sphere(wi, terms)
+    cosine, cut = stable.cosine(wi, wm), _cut(wi, terms)
     slack = 1 - 64 * float(jnp.finfo(wm.dtype).eps)
-    inside = (cosine > 0) & (2 * cosine * wm[2] >= slack * cut * i.norm * q)
-    area = i.norm * (i.rise - cut)
+    # A is canonical up to a rotation and the factor ‖A n‖.
+    An_square = A[0, 2] ** 2 + A[1, 2] ** 2 + A[2, 2] ** 2
+    inside = (cosine > 0) & (2 * cosine * wm[2] >= slack * cut * (An_square * inverse_square(wm, A)[0]))
+    flat = x * x + y * y
+    norm = stable.sqrt(flat + z * z)
+    below = z < 0
+    rise = jnp.where(below, flat / jnp.where(below, norm - z, 1), norm + z)
+    area = rise - cut
     return jnp.where(inside, 2 * ndf.ellipsoid(wm, A) * cosine / jnp.where(inside, area, 1), 0)

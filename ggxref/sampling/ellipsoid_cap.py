@@ -1,26 +1,35 @@
 """Visible normals of the ellipsoid NDF from a uniform spherical cap: dupuy2023's method after a linear map."""
 
-from ggxref import stable
-from ggxref._types import Mat3, Turn, Vec2, Vec3
-from ggxref.ellipsoid import canonical
-from ggxref.sampling._sphere import Incident, half_in_cap, incident
+import jax.numpy as jnp
+
+from ggxref import _pairs, stable
+from ggxref._types import Mat3, Scalar, Turn, Vec2, Vec3
+from ggxref.ellipsoid import canonical_terms
+from ggxref.sampling._half_vector import half_in_cap
 from ggxref.sampling._visible import pdf_ellipsoid as pdf
 
 __all__ = ["pdf", "sample"]
 
-
-def to_sphere(wi: Vec3, canonical_A: Mat3) -> Incident:
-    """`A wi` for a canonical `A`, as the sphere-space direction."""
-    (c00, c10, _), (_, c11, _), (ex, ey, _) = canonical_A
-    return incident(c00 * wi[0] + c10 * wi[1], c11 * wi[1], ex * wi[0] + ey * wi[1] + wi[2])
+Canonical = tuple[Scalar, Scalar, Scalar, Scalar, Scalar]
+"""`(c00, c10, c11, ex, ey)` of a canonical `A`."""
 
 
-def from_sphere(x, y, z, canonical_A: Mat3) -> Vec3:
+def to_sphere(wi: Vec3, A: Canonical) -> tuple[Scalar, Scalar, Scalar]:
+    """`A wi` for a canonical `A`: along the sphere-space direction. Its sums cancel as soon as `A` is skewed."""
+    c00, c10, c11, ex, ey = A
+    x, y, z = wi
+    horizontal = _pairs.rounded(_pairs.dot((c00, c10), (x, y)))
+    return horizontal, c11 * y, _pairs.rounded(_pairs.dot((ex, ey, jnp.ones_like(z)), (x, y, z)))
+
+
+def from_sphere(x: Scalar, y: Scalar, z: Scalar, A: Canonical) -> Vec3:
     """The micronormal along `Aᵀ (x, y, z)` for a canonical `A`: unit, (3,). Its height is z's sign, exactly."""
-    (c00, c10, _), (_, c11, _), (ex, ey, _) = canonical_A
-    return stable.direction(c00 * x + ex * z, c10 * x + c11 * y + ey * z, z)
+    c00, c10, c11, ex, ey = A
+    image = _pairs.dot((c00, ex), (x, z)), _pairs.dot((c10, c11, ey), (x, y, z))
+    return stable.direction(*map(_pairs.rounded, image), z)
 
 
+@stable.widened
 def sample(u: Vec2, wi: Vec3, A: Mat3, *, turn: Turn = stable.cos_sin_turn) -> Vec3:
     r"""With `A` in canonical form, $\omega_m \propto A^T(o' + i')$, $i' = A\omega_i/\|A\omega_i\|$, `o'` uniform on $\{z > -i_z'\}$.
 
@@ -30,5 +39,5 @@ def sample(u: Vec2, wi: Vec3, A: Mat3, *, turn: Turn = stable.cos_sin_turn) -> V
 
     dupuy2023 listing 3 under walter2014 (24): in sphere space the reflections of the half sphere about A n fill a cap.
     """
-    A = canonical(A)
-    return from_sphere(*half_in_cap(u, to_sphere(wi, A), 0, turn), A)
+    terms = canonical_terms(A)
+    return from_sphere(*half_in_cap(u, *to_sphere(wi, terms), 0, turn), terms)
