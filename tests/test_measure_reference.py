@@ -7,14 +7,13 @@ import pytest
 
 from ggxref.measure import doubledouble as dd
 from ggxref.measure.accuracy import arguments, exact
-from ggxref.measure.reference import FLOAT64_ONLY, REFERENCES
+from ggxref.measure.reference import REFERENCES
 from ggxref.measure.regions import REGIONS, rounded
 from ggxref.measure.tables import DRAWS, library
 from ggxref.oracle import precision
 
-# The references' digits: an ulp of float32 is 6e-8, so float64's leave a millionth of one, and an ulp of float64 is
-# 1e-16. Measured worst 1.1e-21 (the skewed densities, whose matrix products cancel).
-TOLERANCE = {True: 1e-11, False: 1e-19}
+# An ulp of float64 is 1e-16. Measured worst 1.1e-21 (the skewed densities, whose matrix products cancel).
+TOLERANCE = 1e-19
 POINTS = 6
 
 
@@ -62,7 +61,7 @@ def _distance(reference, name, region) -> float:
 @pytest.mark.parametrize("name", REFERENCES)
 def test_reference_agrees_with_the_oracle(name):
     for region in REGIONS:
-        assert _distance(REFERENCES[name], name, region) < TOLERANCE[name in FLOAT64_ONLY], region
+        assert _distance(REFERENCES[name], name, region) < TOLERANCE, region
 
 
 def test_agreement_can_fail():
@@ -71,7 +70,7 @@ def test_agreement_can_fail():
     def shifted(wm, alpha):
         return REFERENCES["ndf.ggx"](wm, alpha) * dd.constant(1 + Fraction(1, 10**18))
 
-    assert _distance(shifted, "ndf.ggx", "typical") > TOLERANCE[False]
+    assert _distance(shifted, "ndf.ggx", "typical") > TOLERANCE
 
 
 def _fraction(x, k):

@@ -9,7 +9,7 @@ import numpy as np
 
 from ggxref.measure import maps, peers, speed, variance
 from ggxref.measure.accuracy import measure
-from ggxref.measure.reference import FLOAT64_ONLY, REFERENCES
+from ggxref.measure.reference import REFERENCES
 from ggxref.measure.regions import REGIONS
 from ggxref.measure.variants import QUANTITIES
 
@@ -41,7 +41,6 @@ def accuracy(points: int) -> Pieces:
         f"{name}-{dtype}": partial(_accuracy, name, dtype, points if dtype == "f32" else max(points // 16, 1 << 10))
         for dtype in ("f32", "f64", "f16", "bf16")
         for name in REFERENCES
-        if not (dtype == "f64" and name in FLOAT64_ONLY)
     }
 
 

@@ -5,7 +5,7 @@ import math
 import jax.numpy as jnp
 
 from ggxref import bsdf, fresnel, geometry, masking, ndf, stable
-from ggxref.measure import reference
+from ggxref.measure.reference import formulas as reference
 from ggxref.measure.variants.densities import exact_dot
 from ggxref.measure.variants.form import Variant
 

@@ -6,19 +6,18 @@ with the oracle by `tests/test_measure_reference.py`.
 """
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
-from scipy.special import erfcx
+from flint import arb
 
-from ggxref.measure.doubledouble import DD, PI, cos_sin_turn, exp, log, maximum, minimum, sqrt, where
+from ggxref.measure.doubledouble import DD, PI, exp, log, maximum, minimum, sqrt, where
+from ggxref.oracle.precision import working
 
 REFERENCES: dict[str, Callable] = {}
 
-# Known to float64 only, so they grade float32 and narrower.
-FLOAT64_ONLY = {"masking.lambda_beckmann", "masking.g1_beckmann"}
 
-
-def _stands_for(name):
+def stands_for(name):
     def register(function):
         REFERENCES[name] = function
         return function
@@ -81,7 +80,7 @@ def _over(a, b):
 # ndf
 
 
-@_stands_for("ndf.ggx")
+@stands_for("ndf.ggx")
 def ndf_ggx(wm, alpha):
     x, y, z = unit(wm)
     q = (x / alpha[0]) * (x / alpha[0]) + (y / alpha[1]) * (y / alpha[1]) + z * z
@@ -95,7 +94,7 @@ def _tangent_square(wm, alpha):
     return a * a + b * b
 
 
-@_stands_for("ndf.beckmann")
+@stands_for("ndf.beckmann")
 def ndf_beckmann(wm, alpha):
     z = unit(wm)[2]
     above = z.hi > 0
@@ -105,7 +104,7 @@ def ndf_beckmann(wm, alpha):
     return where(seen, exp(exponent) / (PI * alpha[0] * alpha[1] * square * square), 0.0)
 
 
-@_stands_for("ndf.student_t")
+@stands_for("ndf.student_t")
 def ndf_student_t(wm, alpha, gamma):
     z = unit(wm)[2]
     above = z.hi > 0
@@ -115,7 +114,7 @@ def ndf_student_t(wm, alpha, gamma):
     return where(above, power / (PI * alpha[0] * alpha[1] * square * square), 0.0)
 
 
-@_stands_for("ndf.ellipsoid")
+@stands_for("ndf.ellipsoid")
 def ndf_ellipsoid(wm, A):
     wm = unit(wm)
     det = _det(A)
@@ -146,7 +145,7 @@ def _front(w, wm):
     return np.sign(_dot(w, wm).hi) * np.sign(w[2].hi) > 0
 
 
-@_stands_for("masking.lambda_ggx")
+@stands_for("masking.lambda_ggx")
 def masking_lambda_ggx(w, alpha):
     w = unit(w)
     square = _flat(w, alpha)
@@ -154,33 +153,62 @@ def masking_lambda_ggx(w, alpha):
     return square / (2.0 * z * (z + sqrt(square + z * z)))
 
 
+@cache
+def _ierfc_coefficients(count=52) -> list[DD]:
+    """Chebyshev's of sqrt(pi) (1 + 2 a²) exp(a²) ierfc(a) in t = (a - 3)/(a + 3), by the oracle's arithmetic."""
+    with working(400):
+        angles = [(arb.pi() * (2 * j + 1)) / (2 * count) for j in range(count)]
+        values = []
+        for angle in angles:
+            a = 3 * (1 + angle.cos()) / (1 - angle.cos())
+            square = a * a
+            tail = (-square).exp() / arb.pi().sqrt() - a * a.erfc()
+            values.append(arb.pi().sqrt() * (1 + 2 * square) * square.exp() * tail)
+        sums = [sum((v * (k * x).cos() for v, x in zip(values, angles, strict=True)), arb(0)) for k in range(count)]
+        found = []
+        for k, total in enumerate(sums):
+            c = total * (1 if k == 0 else 2) / count
+            hi = float(c.mid())
+            found.append(DD(hi, float((c - hi).mid())))
+        return found
+
+
 def _gaussian_area(w, alpha):
-    """float64: erfcx has no double-double. Its error is below 1e-13, as 1/√π − a erfcx(a) cancels by 2a² < 400."""
-    s = np.sqrt(_flat(w, alpha).hi)
-    a = np.abs(w[2].hi) / np.where(s > 0, s, 1)
-    tail = (1 / np.sqrt(np.pi) - a * erfcx(a)) * np.exp(-a * a)
-    return DD(np.where((s > 0) & (a < 26), s * tail / 2, 0), np.zeros_like(s))
+    """|z| Λ = s ierfc(|z|/s)/2."""
+    flat = _flat(w, alpha)
+    s = sqrt(flat)
+    some = s.hi > 0
+    a = abs(w[2]) / where(some, s, 1.0)
+    seen = some & (a.hi < 26)  # beyond, it is below 1e-290
+    a = where(seen, a, 1.0)
+    t = (a - 3.0) / (a + 3.0)
+    coefficients = _ierfc_coefficients()
+    b, b_next = t * 0.0, t * 0.0
+    for c in reversed(coefficients[1:]):  # Clenshaw
+        b, b_next = c + 2.0 * t * b - b_next, b
+    scaled = (coefficients[0] + t * b - b_next) / (sqrt(PI) * (1.0 + 2.0 * a * a))
+    return where(seen, s * scaled * exp(-(a * a)) * 0.5, 0.0)
 
 
-@_stands_for("masking.lambda_beckmann")
+@stands_for("masking.lambda_beckmann")
 def masking_lambda_beckmann(w, alpha):
     w = unit(w)
     return _gaussian_area(w, alpha) / abs(w[2])
 
 
-@_stands_for("masking.g1_ggx")
+@stands_for("masking.g1_ggx")
 def masking_g1_ggx(w, wm, alpha):
     up = _up(unit(w))
     return where(_front(w, wm), up[2] / _sigma_ggx(up, alpha), 0.0)
 
 
-@_stands_for("masking.g1_beckmann")
+@stands_for("masking.g1_beckmann")
 def masking_g1_beckmann(w, wm, alpha):
     up = _up(unit(w))
     return where(_front(w, wm), _over(up[2], up[2] + _gaussian_area(up, alpha)), 0.0)
 
 
-@_stands_for("masking.g1_v_cavity")
+@stands_for("masking.g1_v_cavity")
 def masking_g1_v_cavity(w, wm):
     w, wm = unit(w), unit(wm)
     return where(_front(w, wm), minimum(_over(2.0 * abs(wm[2] * w[2]), abs(_dot(w, wm))), 1.0), 0.0)
@@ -196,23 +224,23 @@ def _sigma_ellipsoid(w, A):
     return total / (2.0 * _dot(n, n))
 
 
-@_stands_for("masking.g1_ellipsoid")
+@stands_for("masking.g1_ellipsoid")
 def masking_g1_ellipsoid(w, wm, A):
     up = _up(unit(w))
     return where(_front(w, wm), minimum(_over(up[2], _sigma_ellipsoid(up, A)), 1.0), 0.0)
 
 
-@_stands_for("masking.g2_height_correlated")
+@stands_for("masking.g2_height_correlated")
 def masking_g2_height_correlated(g1_i, g1_o):
     return _over(g1_i * g1_o, g1_i + g1_o - g1_i * g1_o)
 
 
-@_stands_for("masking.g2_separable")
+@stands_for("masking.g2_separable")
 def masking_g2_separable(g1_i, g1_o):
     return g1_i * g1_o
 
 
-@_stands_for("masking.g2_v_cavity")
+@stands_for("masking.g2_v_cavity")
 def masking_g2_v_cavity(wi, wo, wm):
     a, b = masking_g1_v_cavity(wi, wm), masking_g1_v_cavity(wo, wm)
     return where(wo[2].hi > 0, minimum(a, b), _positive(a + b - 1.0))
@@ -221,13 +249,13 @@ def masking_g2_v_cavity(wi, wo, wm):
 # fresnel
 
 
-@_stands_for("fresnel.schlick")
+@stands_for("fresnel.schlick")
 def fresnel_schlick(cos_i, f0):
     c = 1.0 - abs(cos_i)
     return f0 + (1.0 - f0) * (c * c) * (c * c) * c
 
 
-@_stands_for("fresnel.dielectric")
+@stands_for("fresnel.dielectric")
 def fresnel_dielectric(cos_i, eta):
     c = abs(cos_i)
     square = 1.0 - eta * eta + (eta * c) * (eta * c)
@@ -238,7 +266,7 @@ def fresnel_dielectric(cos_i, eta):
     return where(gap == 0, 0.0, where((square.hi <= 0) & (gap < 0), 1.0, value))
 
 
-@_stands_for("fresnel.conductor")
+@stands_for("fresnel.conductor")
 def fresnel_conductor(cos_i, eta, k):
     c = abs(cos_i)
     cc, ss = c * c, (1.0 - c) * (1.0 + c)
@@ -255,12 +283,12 @@ def fresnel_conductor(cos_i, eta, k):
 # jacobians, directions, areas
 
 
-@_stands_for("jacobian.reflection")
+@stands_for("jacobian.reflection")
 def jacobian_reflection(wo, wm):
     return 1.0 / (4.0 * abs(_dot(unit(wo), unit(wm))))
 
 
-@_stands_for("jacobian.refraction")
+@stands_for("jacobian.refraction")
 def jacobian_refraction(wi, wo, wm, n_i, n_o):
     wi, wo, wm = unit(wi), unit(wo), unit(wm)
     o = _dot(wo, wm)
@@ -268,24 +296,24 @@ def jacobian_refraction(wi, wo, wm, n_i, n_o):
     return n_o * n_o * abs(o) / (total * total)
 
 
-@_stands_for("jacobian.slope")
+@stands_for("jacobian.slope")
 def jacobian_slope(wm):
     z = unit(wm)[2]
     return 1.0 / (z * z * z)
 
 
-@_stands_for("jacobian.linear")
+@stands_for("jacobian.linear")
 def jacobian_linear(wm, M):
     stretched = _norm(_apply(M, unit(wm)))
     return abs(_det(M)) / (stretched * stretched * stretched)
 
 
-@_stands_for("ellipsoid.projected_area")
+@stands_for("ellipsoid.projected_area")
 def ellipsoid_projected_area(w, A, size):
     return PI * size * size * _norm(_apply(A, unit(w))) / abs(_det(A))
 
 
-@_stands_for("ellipsoid.lune_area")
+@stands_for("ellipsoid.lune_area")
 def ellipsoid_lune_area(u, v, A, size):
     u, v = _apply(A, unit(u)), _apply(A, unit(v))
     product, cosine = _norm(u) * _norm(v), _dot(u, v)
@@ -295,18 +323,18 @@ def ellipsoid_lune_area(u, v, A, size):
     return PI * size * size * total / (2.0 * abs(_det(A)) * _norm(v))
 
 
-@_stands_for("geometry.reflect")
+@stands_for("geometry.reflect")
 def geometry_reflect(w, wm):
     w, wm = unit(w), unit(wm)
     return _plus(_scaled(2.0 * _dot(w, wm), wm), _scaled(-1.0, w))
 
 
-@_stands_for("geometry.half_reflection")
+@stands_for("geometry.half_reflection")
 def geometry_half_reflection(wi, wo):
     return unit(_plus(unit(wi), unit(wo)))
 
 
-@_stands_for("bsdf.brdf_ggx")
+@stands_for("bsdf.brdf_ggx")
 def bsdf_brdf_ggx(wi, wo, alpha):
     wm, z_i, z_o = geometry_half_reflection(wi, wo), unit(wi)[2], unit(wo)[2]
     seen = (z_i.hi > 0) & (z_o.hi > 0)
@@ -322,17 +350,17 @@ def _visible(wm, wi, D, sigma):
     return where(cosine.hi > 0, _over(cosine * D, sigma), 0.0)
 
 
-@_stands_for("sampling.spherical_cap.pdf")
+@stands_for("sampling.spherical_cap.pdf")
 def sampling_spherical_cap_pdf(wm, wi, alpha):
     return _visible(wm, wi, ndf_ggx(wm, alpha), _sigma_ggx(unit(wi), alpha))
 
 
-@_stands_for("sampling.ellipsoid_cap.pdf")
+@stands_for("sampling.ellipsoid_cap.pdf")
 def sampling_ellipsoid_cap_pdf(wm, wi, A):
     return _visible(wm, wi, ndf_ellipsoid(wm, A), _sigma_ellipsoid(unit(wi), A))
 
 
-@_stands_for("sampling.normals.pdf_ggx")
+@stands_for("sampling.normals.pdf_ggx")
 def sampling_normals_pdf_ggx(wm, alpha):
     return ndf_ggx(wm, alpha) * unit(wm)[2]
 
@@ -346,82 +374,6 @@ def _bound_terms(wi, alpha):
     return k, where(above, a * a * (s * s + wi[2] * wi[2]) / denominator, 0.0)
 
 
-@_stands_for("sampling.bounded_cap.bound")
+@stands_for("sampling.bounded_cap.bound")
 def sampling_bounded_cap_bound(wi, alpha):
     return _bound_terms(unit(wi), alpha)[0]
-
-
-# samplers
-
-
-def _sphere(wi, alpha):
-    x, y, z = unit(wi)
-    return alpha[0] * x, alpha[1] * y, z
-
-
-def _half_in_cap(u, i, cut):
-    """Half vector in sphere space, times the length of `i` (not unit); the cap is {z > cut − i_z} in the same unit."""
-    square = i[0] * i[0] + i[1] * i[1]
-    t = sqrt(square + i[2] * i[2])
-    large = t + abs(i[2])
-    small = square / large
-    below = i[2].hi < 0
-    height, rest = where(below, small, large) - cut, where(below, large, small) + cut
-    c, s = cos_sin_turn(u[0])
-    depth = u[1] * height
-    radius = sqrt(depth * (2.0 * (1.0 - u[1]) * t + u[1] * rest))
-    return radius * c + i[0], radius * s + i[1], (1.0 - u[1]) * height + cut
-
-
-@_stands_for("sampling.spherical_cap.sample")
-def sampling_spherical_cap_sample(u, wi, alpha):
-    x, y, z = _half_in_cap(u, _sphere(wi, alpha), 0.0)
-    return unit((alpha[0] * x, alpha[1] * y, z))
-
-
-@_stands_for("sampling.bounded_cap.sample")
-def sampling_bounded_cap_sample(u, wi, alpha):
-    i = _sphere(wi, alpha)
-    x, y, z = _half_in_cap(u, i, _bound_terms(unit(wi), alpha)[1] * i[2])
-    return unit((alpha[0] * x, alpha[1] * y, z))
-
-
-@_stands_for("sampling.cross_section.sample")
-def sampling_cross_section_sample(u, wi, alpha):
-    """dupuy2023 listing 2, in the frame of the stretched ω_i; double-double carries its cancellations."""
-    i = unit(_sphere(wi, alpha))
-    flat = sqrt(i[0] * i[0] + i[1] * i[1])
-    pole = flat.hi == 0
-    safe = where(pole, 1.0, flat)
-    w1 = where(pole, 1.0, -i[1] / safe), where(pole, 0.0, i[0] / safe), flat * 0.0
-    w2 = _cross(i, w1)
-    c, s = cos_sin_turn(u[0])
-    r = sqrt(u[1])
-    t1, t2 = r * c, r * s
-    blend = (1.0 + i[2]) * 0.5
-    t2 = (1.0 - blend) * sqrt(1.0 - t1 * t1) + blend * t2
-    t3 = sqrt(1.0 - t1 * t1 - t2 * t2)
-    x, y, z = _plus(_plus(_scaled(t1, w1), _scaled(t2, w2)), _scaled(t3, i))
-    return unit((alpha[0] * x, alpha[1] * y, _positive(z)))
-
-
-@_stands_for("sampling.normals.sample_ggx")
-def sampling_normals_sample_ggx(u, alpha):
-    c, s = cos_sin_turn(u[0])
-    r = sqrt(u[1])
-    return unit((alpha[0] * r * c, alpha[1] * r * s, sqrt(1.0 - u[1])))
-
-
-@_stands_for("sampling.ellipsoid_cap.sample")
-def sampling_ellipsoid_cap_sample(u, wi, A):
-    """The canonical form by the Cholesky factor of S = AᵀA/‖An‖², as design.md defines it."""
-    rows = _columns(A)
-    n = _dot(rows[2], rows[2])
-    ex, ey = _dot(rows[0], rows[2]) / n, _dot(rows[1], rows[2]) / n
-    c00 = sqrt(_dot(rows[0], rows[0]) / n - ex * ex)
-    c10 = (_dot(rows[0], rows[1]) / n - ex * ey) / c00
-    c11 = abs(_det(A)) / (n * sqrt(n) * c00)
-    x, y, z = unit(wi)
-    i = c00 * x + c10 * y, c11 * y, ex * x + ey * y + z
-    x, y, z = _half_in_cap(u, i, 0.0)
-    return unit((c00 * x + ex * z, c10 * x + c11 * y + ey * z, z))
