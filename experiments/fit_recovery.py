@@ -1,7 +1,7 @@
 """Do fits of synthetic data find what made them, do their intervals hold it 95 times in 100, and is the right model chosen?
 
     python experiments/fit_recovery.py intervals --trials 600 --seed 501 --page docs/fitting.md
-    python experiments/fit_recovery.py choice --trials 100 --seed 302 --page docs/fitting.md
+    python experiments/fit_recovery.py choice --trials 500 --seed 502 --page docs/fitting.md
     python experiments/fit_recovery.py skew --trials 60 --seed 303 --page docs/fitting.md
 
 Reflectance: 960 directions, five incident; slopes: 8192 independent ones. A trial is one draw of the noise. Each part writes its

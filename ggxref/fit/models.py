@@ -135,8 +135,11 @@ _slope_densities = jax.jit(jax.vmap(slope_density, (None, -1, None)), static_arg
 
 
 def brdfs(theta: Vector, wi: Vector, wo: Vector, wm: Vector, surface: Surface) -> np.ndarray:
-    """`brdf` of many: directions (3, n), values (bands, n)."""
-    return np.asarray(_brdfs(theta, wi, wo, wm, surface))
+    """`brdf` of many: directions (3, n), values (bands, n). Filled up to a power of two, so that few sizes are compiled."""
+    count = wi.shape[-1]
+    fill = (1 << max(count - 1, 1023).bit_length()) - count
+    directions = (np.pad(w, ((0, 0), (0, fill)), constant_values=1) for w in (wi, wo, wm))
+    return np.asarray(_brdfs(theta, *directions, surface))[:, :count]
 
 
 def slope_densities(theta: Vector, slopes: Vector, tail: str) -> np.ndarray:
