@@ -98,7 +98,7 @@ def draw(found):
     right.set(xlabel="processor time [s]", ylabel="root mean square error")
     for panel in (left, right):
         panel.grid(alpha=0.3)
-        panel.legend(frameon=False)
+        panel.legend(frameon=False, loc="upper right")
     write_atomically(FIGURE, figure_bytes(figure))
 
 
