@@ -101,6 +101,21 @@ def test_pbrt_takes_alpha_without_its_remapping():
     assert '"float uroughness" [0.3] "float vroughness" [0.1] "bool remaproughness" [false]' in text
 
 
+@pytest.mark.parametrize(
+    ("form", "said"),
+    [("pbrt", '"rgb reflectance" [1 1 1]'), ("gltf", '"metallicFactor": 1.0'), ("materialx", 'value="1, 1, 1"')],
+)
+def test_heights_alone_are_of_a_mirror(form, said):
+    """They say nothing of F; η = 0, which no conductor has, is no number in pbrt."""
+    of_reflectance = ladder(entries(), "anisotropic")
+    shape = {name: value for name, value in of_reflectance.best.values.items() if name not in ("f0", "diffuse")}
+    heights = replace(of_reflectance, problem=replace(of_reflectance.problem, surface=None),
+                      fits=(replace(of_reflectance.best, values=shape),))  # fmt: skip
+    text, note = export.text(heights, form)
+    assert said in text and "says nothing of F" in note
+    assert "says nothing" not in export.text(of_reflectance, form)[1]
+
+
 @pytest.mark.parametrize("tail", ["ggx", "beckmann"])
 def test_mitsuba_has_the_same_values(tail):
     """Its own evaluation of the exported material, in float32 and with a rational fit of Beckmann's G."""

@@ -18,6 +18,7 @@ from ggxref.fit.fitting import Fit, Ladder, fit_models
 
 SMALLEST_ALBEDO = 1e-3
 """Of the diffuse term, below which it is not said to a renderer that has none."""
+MIRROR = "a height field says nothing of F: exported with a reflectance of 1"
 
 
 class Material(NamedTuple):
@@ -39,14 +40,15 @@ def check(form: str | None) -> None:
 
 
 def text(ladder: Ladder, form: str, nearest: bool = False) -> tuple[str, str]:
-    """The file's content, and a sentence that says what was taken instead of the chosen model, or "".
+    """The file's content, and a sentence that says what was taken instead of the chosen model or of an unknown F, or "".
 
     - `nearest`: where the chosen model cannot be said, take the fitted one of least held-out loss that can.
     """
     write, can = FORMS[form]
     reason = can(ladder, ladder.best)
+    unsaid = MIRROR if ladder.problem.surface is None and form != "json" else ""
     if not reason:
-        return write(ladder, ladder.best), ""
+        return write(ladder, ladder.best), unsaid
     if not nearest:
         raise InputError(f"--export {form}: the model {ladder.chosen} {reason}; --nearest takes the closest that can")
     able = [fit for fit in (*ladder.fits, *_plainer(ladder)) if not can(ladder, fit)]
@@ -57,6 +59,7 @@ def text(ladder: Ladder, form: str, nearest: bool = False) -> tuple[str, str]:
     name = f"{fit.model.name}{'' if any(fit is each for each in ladder.fits) else ' without a diffuse term'}"
     return write(ladder, fit), (
         f"{ladder.chosen} {reason}: exported {name}, whose held-out loss of {fit.held_out.mean():.4g} is {above:.2g} above"
+        f"{unsaid and f'; {unsaid}'}"
     )
 
 
@@ -74,12 +77,12 @@ def material(ladder: Ladder, fit: Fit) -> Material:
         return np.resize(found or [0.0], 3) if len(found) <= 1 else np.array(found)
 
     surface = ladder.problem.surface
-    schlick = surface is not None and surface.fresnel == "schlick"
+    f0 = {"schlick": bands("f0"), "conductor": None}[surface.fresnel] if surface else np.ones(3)
     rotation = fit.values["rotation"] if fit.values["anisotropy"] > 1 + 1e-9 else 0.0
     return Material(
         alpha=(fit.values["alpha_1"], fit.values["alpha_2"]),
         rotation=rotation,
-        f0=bands("f0") if schlick else None,
+        f0=f0,
         eta=bands("eta"),
         k=bands("k"),
         diffuse=bands("diffuse"),
