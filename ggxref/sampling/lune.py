@@ -4,9 +4,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from ggxref import stable
+from ggxref import _pairs, stable
 from ggxref._types import Mat3, Scalar, Vec2, Vec3
-from ggxref.ellipsoid import cofactor, length, times
+from ggxref.ellipsoid import cofactor, length, times, times_exactly
 from ggxref.geometry import basis
 from ggxref.sampling._sphere import Incident, crescent
 from ggxref.sampling._visible import pdf_ellipsoid as pdf
@@ -25,16 +25,19 @@ def _concentric(u: Vec2) -> tuple[Scalar, Scalar, Scalar]:
 
 
 def _frame(wi, A):
-    """(42)–(44) and the lune's angle: e1, e2, e3 as rows, `A wi` in the coordinates of A n's pole, and its sine."""
-    a, n = times(A, *wi), times(A, 0, 0, 1)
+    """(42)–(44) and the lune's angle: e1, e2, e3 as rows, `A wi` in the coordinates of A n's pole, and ‖A n‖."""
+    a, n = times_exactly(A, wi), (A[0, 2], A[1, 2], A[2, 2])
     norm_a, norm_n = length(*a), length(*n)
-    cross = times(cofactor(A)[0], wi[1], -wi[0], 0)  # Aψ × An, also where det A < 0
-    sin_product = length(*cross)
-    e3 = jnp.stack(a) / norm_a
+    side = wi[1], -wi[0], jnp.zeros_like(wi[0])
+    # Aψ × An, also where det A < 0: its minors and their sums cancel under skew.
+    x, y, z = (_pairs.rounded(_pairs.dot_of_pairs(row, side)) for row in _pairs.cofactor(A))
+    sin_product = length(x, y, z)
+    e3 = tuple(c / norm_a for c in a)
     collinear = sin_product == 0
-    free = basis(e3)
-    e2 = jnp.where(collinear, free[1], jnp.stack(cross) / jnp.where(collinear, 1, sin_product))
-    e1 = jnp.where(collinear, free[0], jnp.cross(e2, e3))
+    free, safe = basis(jnp.stack(e3)), jnp.where(collinear, 1, sin_product)
+    e2 = tuple(jnp.where(collinear, f, c / safe) for f, c in zip(free[1], (x, y, z), strict=True))
+    turned = (e2[j] * e3[k] - e2[k] * e3[j] for j, k in ((1, 2), (2, 0), (0, 1)))
+    e1 = tuple(jnp.where(collinear, f, c) for f, c in zip(free[0], turned, strict=True))
     product = norm_a * norm_n
     cosine = a[0] * n[0] + a[1] * n[1] + a[2] * n[2]
     sin_theta = sin_product / product
@@ -43,7 +46,7 @@ def _frame(wi, A):
     below = cosine < 0
     rise, fall = jnp.where(below, small, large) / product, jnp.where(below, large, small) / product
     pole = Incident(sin_theta, jnp.zeros_like(sin_theta), cosine / product, norm_a, rise, fall)
-    return jnp.stack([e1, e2, e3]), pole, norm_n
+    return (e1, e2, e3), pole, norm_n
 
 
 @stable.widened
@@ -58,10 +61,20 @@ def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:
     """
     along, across, rim = _concentric(u)
     (e1, e2, e3), pole, norm_n = _frame(wi, A)
-    moved, lifted, height = crescent(along, rim, pole, pole.x)
-    x, y, _ = times(A.T, *(moved * e1 + across * e2 + lifted * e3))
-    # The third component is p·An: `height` has its sign right where the sum would round below the horizon.
-    return stable.direction(x, y, norm_n * height)
+    moved, lifted, height = stable.one_loop(*crescent(along, rim, pole, pole.x))
+    x, y, z = (moved * a + across * b + lifted * c for a, b, c in zip(e1, e2, e3, strict=True))
+    p = stable.one_loop(x, y, z)
+    # The components are p·a for the columns a of A. Of each, the share of An takes `height`, which is exact towards the
+    # horizon and has its sign right, where p has lost it; only the rest is left to p.
+    An, square = (A[0, 2], A[1, 2], A[2, 2]), A[0, 2] ** 2 + A[1, 2] ** 2 + A[2, 2] ** 2
+    raised = norm_n * height
+
+    def component(a):
+        share = _pairs.rounded(_pairs.dot(a, An)) / square
+        rest = tuple(x - share * n for x, n in zip(a, An, strict=True))
+        return rest[0] * p[0] + rest[1] * p[1] + rest[2] * p[2] + share * raised
+
+    return stable.direction(component((A[0, 0], A[1, 0], A[2, 0])), component((A[0, 1], A[1, 1], A[2, 1])), raised)
 
 
 Tries = Float[Array, "n 2"]
