@@ -12,8 +12,9 @@ from ggxref.ellipsoid import sigma as sigma_ellipsoid
 
 def _density(wm, wi, D, sigma):
     cosine = stable.cosine(wi, wm)
-    seen = (cosine > 0) & (sigma > 0)
-    return jnp.where(seen, cosine * D / jnp.where(seen, sigma, 1), 0)
+    seen = (cosine > 0) & (sigma >= jnp.finfo(sigma.dtype).tiny)
+    # The quotient first, which is finite: in the tails of Beckmann, cosine · D is 0 where the density is not.
+    return jnp.where(seen, D * (cosine / jnp.where(seen, sigma, 1)), 0)
 
 
 @stable.widened

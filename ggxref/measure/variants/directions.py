@@ -9,6 +9,7 @@ from ggxref.measure.doubledouble import cos_sin_turn
 from ggxref.measure.reference import REFERENCES
 from ggxref.measure.variants.form import Variant
 from ggxref.sampling import cross_section, spherical_cap
+from ggxref.sampling._half_vector import half_in_cap
 
 exact_cap = REFERENCES["sampling.spherical_cap.sample"]
 exact_cross_section = REFERENCES["sampling.cross_section.sample"]
@@ -34,6 +35,12 @@ def _polynomial(terms):
 def _unit(x, y, z):
     v = jnp.stack([x, y, z])
     return v / jnp.linalg.norm(v)
+
+
+def cap_along(u, wi, alpha):
+    """By the half vector along and across the azimuth of ω_i, which keeps its digits at the rim of the cap."""
+    x, y, z = half_in_cap(u, alpha[0] * wi[0], alpha[1] * wi[1], wi[2], 0)
+    return stable.direction(alpha[0] * x, alpha[1] * y, z)
 
 
 def cap_printed(u, wi, alpha):
@@ -69,6 +76,7 @@ TURN = (
 )
 CAP = (
     Variant("no cancellation", "ggxref.sampling.spherical_cap.sample", spherical_cap.sample),
+    Variant("along the azimuth", "the half vector of ggxref.sampling.ellipsoid_cap", cap_along),
     Variant("printed", "dupuy2023 listing 3", cap_printed),
 )
 CROSS_SECTION = (
