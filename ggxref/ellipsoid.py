@@ -25,6 +25,7 @@ def times_exactly(A: Mat3, w: Vec3) -> tuple[Scalar, Scalar, Scalar]:
     return x, y, z
 
 
+@stable.widened
 def cofactor(A: Mat3) -> tuple[Mat3, Scalar]:
     r"""The cofactor matrix $\det(A)\,A^{-T}$ and $\det A$, without a division: (3, 3) and ().
 
@@ -36,6 +37,7 @@ def cofactor(A: Mat3) -> tuple[Mat3, Scalar]:
     return jnp.stack([jnp.stack([_pairs.rounded(p) for p in row]) for row in minors]), det
 
 
+@stable.widened
 def determinant(A: Mat3) -> Scalar:
     """det A, rounded once."""
     return _pairs.rounded(_pairs.determinant(A))
@@ -127,13 +129,14 @@ def size(A: Mat3) -> Scalar:
     return jnp.sqrt(jnp.abs(determinant(A)) / (math.pi * length(*A[:, 2])))
 
 
-def _reciprocal_scale(x):
+def reciprocal_scale(x: Scalar) -> Scalar:
     """A power of two near 1/|x|: a factor that rounds nothing."""
     integer = jnp.int32 if x.dtype == jnp.float32 else jnp.int64
     one, infinity = (lax.bitcast_convert_type(jnp.asarray(c, x.dtype), integer) for c in (1, jnp.inf))
     # By its exponent's bits: a division, which XLA computes once for all its uses, would cut the expression in pieces.
     scale = 2 * one - (lax.bitcast_convert_type(x, integer) & infinity)
-    return lax.stop_gradient(lax.bitcast_convert_type(scale, x.dtype))
+    least = lax.bitcast_convert_type(jnp.asarray(jnp.finfo(x.dtype).tiny, x.dtype), integer)
+    return lax.stop_gradient(lax.bitcast_convert_type(jnp.maximum(scale, least), x.dtype))
 
 
 def inverse_square(wm: Vec3, A: Mat3) -> tuple[Scalar, Scalar]:
@@ -144,7 +147,7 @@ def inverse_square(wm: Vec3, A: Mat3) -> tuple[Scalar, Scalar]:
     w, minors = tuple(wm), _pairs.cofactor(A)
     det = _pairs.dot_of_pairs(minors[0], tuple(A[0]))
     # Divided before they are squared: cof m is α² at the peak.
-    scale = _reciprocal_scale(det[0])
+    scale = reciprocal_scale(det[0])
     d, d_rest = det[0] * scale, det[1] * scale
     image = [(x * scale, rest * scale) for x, rest in (_pairs.dot_of_pairs(row, w) for row in minors)]
     x, y, z = (x for x, _ in image)

@@ -51,15 +51,19 @@ def _two_sum(a, b):
 
 
 def widened(function: Callable) -> Callable:
-    """`function`, computed in float32 where it is given half precision: the square of 1e-4 is 0 in float16."""
+    """`function`, computed in float32 where it is given half precision: the square of 1e-4 is 0 in float16.
+
+    The result has the dtype of all arguments together.
+    """
 
     @functools.wraps(function)
     def in_float32(*args, **named):
         numbers = args, {k: x for k, x in named.items() if not (isinstance(x, str) or callable(x))}
-        dtype = jnp.result_type(*jax.tree.leaves(numbers))
-        if dtype.itemsize > 2:
+        given = [jnp.result_type(x) for x in jax.tree.leaves(numbers)]
+        if not any(jnp.issubdtype(each, jnp.floating) and each.itemsize == 2 for each in given):
             return function(*args, **named)
-        wide, wide_named = jax.tree.map(lambda x: jnp.asarray(x, jnp.float32), numbers)
+        dtype = jnp.result_type(*given)
+        wide, wide_named = jax.tree.map(lambda x: jnp.asarray(x, jnp.promote_types(dtype, jnp.float32)), numbers)
         result = function(*wide, **(named | wide_named))
         return jax.tree.map(lambda x: x.astype(dtype) if jnp.issubdtype(x.dtype, jnp.floating) else x, result)
 
@@ -253,7 +257,7 @@ def unit(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
 @jax.custom_jvp
 @_traced_once
 def one_loop(*components: Scalar) -> tuple[Scalar, ...]:
-    """The components as they are, all computed in the same pass over the points.
+    """The components as they are, of one dtype and shape, all computed in the same pass over the points.
 
     XLA's loops on a CPU have one result each, so that components repeat what they share, or wait for it in memory; only
     a reduction may have several. Hence each becomes the larger of itself and -inf.
@@ -275,7 +279,8 @@ def _one_loop_jvp(primals, tangents):
 @widened
 def direction(x: Scalar, y: Scalar, z: Scalar) -> Vec3:
     """`unit` as one array (3,): what a sampler ends with."""
-    return jnp.stack(unit(*one_loop(x, y, z)))
+    dtype = jnp.result_type(x, y, z)
+    return jnp.stack(unit(*one_loop(*(jnp.asarray(c, dtype) for c in (x, y, z)))))
 
 
 def either(condition: Bool[Array, ""], one: Vec3, other: Vec3) -> Vec3:

@@ -5,16 +5,16 @@ import math
 import jax.numpy as jnp
 import pytest
 
-from ggxref import ndf, stable
+from ggxref import ndf
 from ggxref.ellipsoid import canonical_terms
 from ggxref.measure.accuracy import measure
 from ggxref.measure.reference import REFERENCES
 from ggxref.measure.tables import DRAWS, library
-from ggxref.sampling import _sphere
+from ggxref.sampling import _sphere, ellipsoid_bounded, ellipsoid_cap
 from ggxref.sampling.ellipsoid_cap import from_sphere, to_sphere
 
 COUNT = 1 << 13
-# Largest error in ulps that 2^16 points of every region and a search came to; half a point is left to the seed.
+# A little above the largest error in ulps that 2^16 to 2^20 points of every region and a search came to.
 LARGEST = {
     "ndf.ellipsoid": 7.3,
     "sampling.ellipsoid_cap.pdf": 9.1,
@@ -23,7 +23,7 @@ LARGEST = {
     "ellipsoid.lune_area": 8.8,
     "jacobian.linear": 8.2,
     "ndf.beckmann": 9.3,
-    "masking.lambda_beckmann": 11.0,
+    "masking.lambda_beckmann": 12.5,
 }
 
 
@@ -71,12 +71,12 @@ def test_half_vectors_that_nearly_cancel():
         assert found(name, nearer, region, rounds=0).excess > 10
 
 
-def test_the_density_keeps_its_derivative():
-    """The rest of a two-word number has none: the value's must be the whole."""
-    import jax
-
-    wm, A = jnp.asarray([0.4, -0.2, 0.894427]), jnp.asarray([[0.3, 0.1, 0], [0, 0.2, 0], [0.5, -0.4, 1]])
-    slope = jax.grad(lambda w: jnp.log(ndf.ellipsoid(w, A)))(wm)
-    plain = jax.grad(lambda w: jnp.log(plain_ellipsoid(w, A)))(wm)
-    assert jnp.allclose(slope, plain, rtol=1e-5)
-    assert not jnp.allclose(jax.grad(lambda w: stable.dot(w, w))(wm), plain, rtol=1e-5)
+def test_scales_near_the_ends_of_the_range():
+    """A's determinant is a number; its squares, and its product with itself, are not."""
+    n = jnp.asarray([0.0, 0.0, 1.0], jnp.float32)
+    for scale in (6.5e12, 6.5e-13):
+        assert ndf.ellipsoid(n, scale * jnp.eye(3, dtype=jnp.float32)) == pytest.approx(1 / math.pi, rel=1e-6)
+    u, wi = jnp.asarray([0.3, 0.4], jnp.float32), jnp.asarray([0.6, 0.0, 0.8], jnp.float32)
+    long = jnp.diag(jnp.asarray([1e10, 1, 1], jnp.float32))
+    for sampler in (ellipsoid_cap, ellipsoid_bounded):
+        assert jnp.linalg.norm(sampler.sample(u, wi, long)) == pytest.approx(1, rel=1e-6)

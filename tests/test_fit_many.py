@@ -103,11 +103,18 @@ def test_options_that_would_do_nothing_are_refused(folder, options, said):
     assert result.exit_code == 2 and said in result.output
 
 
-def test_another_table_is_not_overwritten(folder):
-    other = fit_data.write(folder / "other.csv", "a,b\n1,2\n")
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a,b\n1,2\n", "is no table of fits"),
+        (",".join(many.FIRST) + "\n" + "x," * len(many.FIRST) + "x\n", "row 2: more cells than columns"),
+    ],
+)
+def test_another_table_is_not_overwritten(folder, text, said):
+    other = fit_data.write(folder / "other.csv", text)
     result = CliRunner().invoke(app, ["fit", str(folder / "0.csv"), "--table", str(other)])
-    assert result.exit_code == 2 and "is no table of fits" in result.output
-    assert other.read_text() == "a,b\n1,2\n"
+    assert result.exit_code == 2 and said in result.output
+    assert other.read_text() == text
 
 
 def test_several_files_need_a_table(folder):

@@ -9,8 +9,9 @@ import pytest
 from flint import arb
 from library import numbers, over_rows
 
-from ggxref import stable
+from ggxref import ndf, stable
 from ggxref.oracle.precision import working
+from ggxref.sampling import ellipsoid_cap, normals
 
 N = 400
 
@@ -282,3 +283,17 @@ def test_either_picks_whole_vectors():
     one, other = jnp.arange(3.0), -jnp.arange(3.0)
     picked = jax.vmap(stable.either, (0, None, None))(jnp.array([True, False]), one, other)
     np.testing.assert_array_equal(picked, [one, other])
+
+
+@pytest.mark.parametrize("half", [jnp.float16, jnp.bfloat16])
+def test_half_precision_beside_single_is_widened(half):
+    """Every argument alone in half precision: the result has the dtype of all together."""
+    w, alpha, A, u = (np.asarray(x, np.float32) for x in ((0.6, 0, 0.8), (0.5, 0.25), np.eye(3), (0.25, 0.5)))
+    calls = [(ndf.ellipsoid, w, A), (ndf.beckmann, w, alpha), (normals.sample_ggx, u, alpha)]
+    for function, *args in [*calls, (ellipsoid_cap.sample, u, w, A)]:
+        whole = function(*map(jnp.asarray, args))
+        for k in range(len(args)):
+            mixed = [jnp.asarray(x, half if j == k else np.float32) for j, x in enumerate(args)]
+            got = function(*mixed)
+            assert got.dtype == jnp.float32
+            np.testing.assert_allclose(got, whole, rtol=0.1, atol=0.01)  # w of bfloat16 has three digits

@@ -20,11 +20,16 @@ def intervals(ladder: Ladder, replicates: int, share: float = 0.95) -> dict[str,
     """The central `share` of each parameter and of what follows from them, by name."""
     problem, fit = ladder.problem, ladder.best
     blocks, block = np.unique(problem.block, return_inverse=True)
-    draws = np.random.default_rng(SEED).integers(len(blocks), size=(replicates, len(blocks)))
-    drawn = np.stack([np.bincount(draw, minlength=len(blocks)) for draw in draws])
-    solve, several = _reflectance if problem.surface else _slopes, max(AT_ONCE // problem.size, 1)
-    parts = [drawn[start : start + several] for start in range(0, replicates, several)]
-    found = np.concatenate([solve(ladder, fit, problem.weights * part[:, block]) for part in parts])
+    random, several = np.random.default_rng(SEED), max(AT_ONCE // problem.size, 1)
+
+    def weights(count):
+        draws = random.integers(len(blocks), size=(count, len(blocks)))
+        times = np.stack([np.bincount(draw, minlength=len(blocks)) for draw in draws])
+        return problem.weights * times[:, block]
+
+    solve = _reflectance if problem.surface else _slopes
+    counts = [min(several, replicates - start) for start in range(0, replicates, several)]
+    found = np.concatenate([solve(ladder, fit, weights(count)) for count in counts])
     zero = np.zeros((len(fit.theta),) * 2)
     values = [parameters.report(theta, zero, problem.parameters)[0] for theta in found]
     ends = (1 - share) / 2, (1 + share) / 2

@@ -128,6 +128,9 @@ def _read(table: Path) -> list[dict[str, str]]:
         raise InputError(f"--table: {table} cannot be read: {error}") from error
     if rows and not set(FIRST[:4]) <= set(rows[0]):
         raise InputError(f"--table: {table} is no table of fits: it has no column {FIRST[1]!r}; give another name")
+    for number, row in enumerate(rows, start=2):
+        if None in row:
+            raise InputError(f"--table: {table}, row {number}: more cells than columns; mend it or give another name")
     return rows
 
 

@@ -195,8 +195,8 @@ def tied(points: Points) -> Points:
 def search(
     run, reference, names, worst: Points, dtype, rng, rounds: int, change: Callable = dict
 ) -> tuple[float, list[np.ndarray]]:
-    """Climb from the worst points found: mutate, keep the worst, again. The largest error and its input."""
-    best = [worst[name] for name in names]
+    """Climb from the worst points found, the worst first: mutate, keep the worst, again. The largest error and its input."""
+    best, found = [worst[name] for name in names], 0.0
     keep = best[0].shape[-1]
     for _ in range(rounds):
         parents = {name: np.tile(a, 8) for name, a in zip(names, best, strict=True)}
@@ -204,10 +204,8 @@ def search(
         pool = [np.concatenate([a, children[name]], axis=-1) for name, a in zip(names, best, strict=True)]
         error, graded, _ = errors(run, reference, pool, dtype)
         order = np.argsort(np.where(graded, error, -1))[::-1][:keep]
-        best = [a[..., order] for a in pool]
-    error, graded, _ = errors(run, reference, best, dtype)
-    k = int(np.argmax(np.where(graded, error, -1)))
-    return float(error[k]), [a[..., k] for a in best]
+        best, found = [a[..., order] for a in pool], float(error[order[0]])
+    return found, [a[..., 0] for a in best]
 
 
 def measure(

@@ -11,8 +11,7 @@ import jax.numpy as jnp
 from ggxref import ndf, stable
 from ggxref._types import Mat3, Scalar, Turn, Vec2, Vec3
 from ggxref.ellipsoid import canonical_terms, inverse_square, length
-from ggxref.sampling._half_vector import half_in_cap
-from ggxref.sampling.ellipsoid_cap import Canonical, from_sphere, to_sphere
+from ggxref.sampling.ellipsoid_cap import Canonical, from_sphere, half_vector, to_sphere
 
 
 def _largest_q(wi: Vec3, A: Canonical):
@@ -64,7 +63,7 @@ def sample(u: Vec2, wi: Vec3, A: Mat3, *, turn: Turn = stable.cos_sin_turn) -> V
     - `A`: shape matrix, (3, 3), non-singular. Returns a micronormal with density `pdf`: unit, (3,), above the horizon.
     """
     terms = canonical_terms(A)
-    return from_sphere(*half_in_cap(u, *to_sphere(wi, terms), _cut(wi, terms), turn), terms)
+    return from_sphere(*half_vector(u, wi, terms, _cut(wi, terms), turn), terms)
 
 
 @stable.widened

@@ -3,8 +3,8 @@
 import jax.numpy as jnp
 
 from ggxref import _pairs, stable
-from ggxref._types import Mat3, Scalar, Turn, Vec2, Vec3
-from ggxref.ellipsoid import canonical_terms
+from ggxref._types import Mat3, Real, Scalar, Turn, Vec2, Vec3
+from ggxref.ellipsoid import canonical_terms, reciprocal_scale
 from ggxref.sampling._half_vector import half_in_cap
 from ggxref.sampling._visible import pdf_ellipsoid as pdf
 
@@ -20,6 +20,14 @@ def to_sphere(wi: Vec3, A: Canonical) -> tuple[Scalar, Scalar, Scalar]:
     x, y, z = wi
     horizontal = _pairs.rounded(_pairs.dot((c00, c10), (x, y)))
     return horizontal, c11 * y, _pairs.rounded(_pairs.dot((ex, ey, jnp.ones_like(z)), (x, y, z)))
+
+
+def half_vector(u: Vec2, wi: Vec3, A: Canonical, cut: Real, turn: Turn) -> tuple[Scalar, Scalar, Scalar]:
+    """`half_in_cap` about `A wi`, which is as long as α: shortened to about 1, as Aᵀ makes it longer by α once more."""
+    i = to_sphere(wi, A)
+    scale = reciprocal_scale(jnp.maximum(jnp.maximum(jnp.abs(i[0]), jnp.abs(i[1])), jnp.abs(i[2])))
+    x, y, z = (c * scale for c in i)
+    return half_in_cap(u, x, y, z, cut * scale, turn)
 
 
 def from_sphere(x: Scalar, y: Scalar, z: Scalar, A: Canonical) -> Vec3:
@@ -40,4 +48,4 @@ def sample(u: Vec2, wi: Vec3, A: Mat3, *, turn: Turn = stable.cos_sin_turn) -> V
     dupuy2023 listing 3 under walter2014 (24): in sphere space the reflections of the half sphere about A n fill a cap.
     """
     terms = canonical_terms(A)
-    return from_sphere(*half_in_cap(u, *to_sphere(wi, terms), 0, turn), terms)
+    return from_sphere(*half_vector(u, wi, terms, 0, turn), terms)
