@@ -86,7 +86,7 @@ def speed(rows: Rows, caption: str) -> Figure:
     ax.set_xscale("log", base=2)
     ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), frameon=False)
     ax.grid(True, which="major", lw=0.3, color="0.8")
-    ax.set_title("Samplers of visible normals, float32, median and quartiles of interleaved runs")
+    ax.set_title("Samplers of visible normals, float32, median and quartiles of turns")
     figure.supxlabel(caption, fontsize=6)
     return figure
 

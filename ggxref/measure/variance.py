@@ -88,7 +88,7 @@ def variances(name: str, alphas: np.ndarray, thetas: np.ndarray, seed: int = 0) 
 
 
 def times(points: int = 1 << 16, seconds: float = 4.0) -> dict[str, float]:
-    """Nanoseconds a sample of each sampler, its density included, the best of interleaved runs (float32)."""
+    """Nanoseconds a sample of each sampler, its density included, the best of turns (float32)."""
 
     def whole(sampler):
         def both(u, wi, alpha):
