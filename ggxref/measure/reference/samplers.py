@@ -39,14 +39,20 @@ def sampling_bounded_cap_sample(u, wi, alpha):
     return f.unit((alpha[0] * x, alpha[1] * y, z))
 
 
+def _azimuth(i, at_pole):
+    """‖(x, y)‖ of `i`, cosine and sine of its azimuth; `at_pole` where there is none."""
+    flat = sqrt(i[0] * i[0] + i[1] * i[1])
+    pole = flat.hi == 0
+    safe = where(pole, 1.0, flat)
+    return flat, where(pole, at_pole[0], i[0] / safe), where(pole, at_pole[1], i[1] / safe)
+
+
 @stands_for("sampling.cross_section.sample")
 def sampling_cross_section_sample(u, wi, alpha):
     """dupuy2023 listing 2, in the frame of the stretched ω_i; double-double carries its cancellations."""
     i = f.unit(_sphere(wi, alpha))
-    flat = sqrt(i[0] * i[0] + i[1] * i[1])
-    pole = flat.hi == 0
-    safe = where(pole, 1.0, flat)
-    w1 = where(pole, 1.0, -i[1] / safe), where(pole, 0.0, i[0] / safe), flat * 0.0
+    flat, cos_i, sin_i = _azimuth(i, (0.0, -1.0))
+    w1 = -sin_i, cos_i, flat * 0.0
     w2 = f._cross(i, w1)
     c, s = cos_sin_turn(u[0])
     r = sqrt(u[1])
@@ -91,10 +97,7 @@ def _kepler(v):
 def sampling_slope_ggx_sample(u, wi, alpha):
     """With (sin ψ, cos ψ) at the marginal's quantile and E at the conditional's, as the public twin says."""
     i = f.unit(_sphere(wi, alpha))
-    sin_i = sqrt(i[0] * i[0] + i[1] * i[1])
-    pole = sin_i.hi == 0
-    safe = where(pole, 1.0, sin_i)
-    cos_phi, sin_phi = where(pole, 1.0, i[0] / safe), where(pole, 0.0, i[1] / safe)
+    sin_i, cos_phi, sin_phi = _azimuth(i, (1.0, 0.0))
     total = u[0] * (1.0 + i[2]) - i[2]
     rest = sqrt((1.0 - total) * (1.0 + total))
     sin_psi, cos_psi = total * i[2] - rest * sin_i, rest * i[2] + total * sin_i
