@@ -1,4 +1,4 @@
-"""Where is a derivative not finite? Every public formula and sampler, over every region, at a million points each.
+"""Where is a derivative not finite? The formulas and samplers named below, over every region.
 
 The gradient of each float32 function, summed over its components, with respect to all of its arguments, under `jit`. Points
 whose value is itself infinite are counted apart. Prints a row for each function with faults and a total; exits with 1 if there

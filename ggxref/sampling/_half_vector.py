@@ -6,6 +6,16 @@ from ggxref import stable
 from ggxref._types import Real, Scalar, Turn, Vec2
 
 
+def rise_and_fall(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """‖(x, y, z)‖, and what it exceeds -z and z by, neither a difference of equals: their product is x² + y²."""
+    flat = x * x + y * y
+    norm = stable.sqrt(flat + z * z)
+    large = norm + jnp.abs(z)
+    small = flat / jnp.where(large > 0, large, 1)
+    below = z < 0
+    return norm, jnp.where(below, small, large), jnp.where(below, large, small)
+
+
 def half_in_cap(
     u: Vec2, x: Scalar, y: Scalar, z: Scalar, cut: Real, turn: Turn = stable.cos_sin_turn
 ) -> tuple[Scalar, Scalar, Scalar]:
@@ -18,11 +28,7 @@ def half_in_cap(
     """
     flat = x * x + y * y
     r = stable.sqrt(flat)
-    norm = stable.sqrt(flat + z * z)
-    large = norm + jnp.abs(z)
-    small = flat / jnp.where(large > 0, large, 1)
-    below = z < 0
-    rise, fall = jnp.where(below, small, large), jnp.where(below, large, small)  # norm + z, norm - z
+    norm, rise, fall = rise_and_fall(x, y, z)
     height, rest = rise - cut, fall + cut
     half_z = (1 - u[1]) * height + cut
     rho = stable.sqrt(u[1] * height * (2 * (1 - u[1]) * norm + u[1] * rest))

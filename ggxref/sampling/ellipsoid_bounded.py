@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from ggxref import ndf, stable
 from ggxref._types import Mat3, Scalar, Turn, Vec2, Vec3
 from ggxref.ellipsoid import canonical_terms, inverse_square, length
+from ggxref.sampling._half_vector import rise_and_fall
 from ggxref.sampling.ellipsoid_cap import Canonical, from_sphere, half_vector, to_sphere
 
 
@@ -76,15 +77,11 @@ def pdf(wm: Vec3, wi: Vec3, A: Mat3) -> Scalar:
     tokuyoshi2024's p_bound, for the ellipsoid.
     """
     terms = canonical_terms(A)
-    x, y, z = to_sphere(wi, terms)
+    _, rise, _ = rise_and_fall(*to_sphere(wi, terms))
     cosine, cut = stable.cosine(wi, wm), _cut(wi, terms)
     slack = 1 - 64 * float(jnp.finfo(wm.dtype).eps)
     # A is canonical up to a rotation and the factor ‖A n‖.
     An_square = A[0, 2] ** 2 + A[1, 2] ** 2 + A[2, 2] ** 2
     inside = (cosine > 0) & (2 * cosine * wm[2] >= slack * cut * (An_square * inverse_square(wm, A)[0]))
-    flat = x * x + y * y
-    norm = stable.sqrt(flat + z * z)
-    below = z < 0
-    rise = jnp.where(below, flat / jnp.where(below, norm - z, 1), norm + z)
     area = rise - cut
     return jnp.where(inside, 2 * ndf.ellipsoid(wm, A) * cosine / jnp.where(inside, area, 1), 0)
