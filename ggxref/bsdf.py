@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from ggxref import geometry, jacobian, stable
 from ggxref._types import Real, Scalar, Vec2, Vec3
-from ggxref.ellipsoid import length
+from ggxref.ellipsoid import length, reciprocal_scale
 
 
 def _over(numerator, denominator):
@@ -38,19 +38,16 @@ def brdf_ggx(wi: Vec3, wo: Vec3, alpha: Vec2) -> Scalar:
     normalised, and no digit is lost where $\omega_o$ is nearly $-\omega_i$. A third of the composition's time.
     """
     x, y, z = stable.unit_sum(wi, wo)
-    # The quotient q knows no length of h, but near the horizon its squares may underflow.
-    info = jnp.finfo(x.dtype)
-    scale = jnp.where(
-        jnp.maximum(jnp.maximum(abs(x), abs(y)), z) < 2.0 ** (info.minexp // 4), 2.0 ** -(info.minexp // 2), 1
-    )
+    # The quotient q knows no length of h, whose squares may underflow near the horizon.
+    scale = reciprocal_scale(jnp.abs(x) + jnp.abs(y) + jnp.abs(z))
     x, y, z = x * scale, y * scale, z * scale
     square = x * x + y * y + z * z
     seen = (wi[2] > 0) & (wo[2] > 0) & (square > 0)
-    square = jnp.where(seen, square, 1)
-    q = jnp.where(seen, ((x / alpha[0]) ** 2 + (y / alpha[1]) ** 2 + z * z) / square, 1)
+    stretched = (x / alpha[0]) ** 2 + (y / alpha[1]) ** 2 + z * z
     length_i, length_o = (length(alpha[0] * w[0], alpha[1] * w[1], w[2]) for w in (wi, wo))
-    between = jnp.where(seen, wo[2] * length_i + wi[2] * length_o, 1)
-    return jnp.where(seen, 1 / (2 * math.pi * (alpha[0] * q) * (alpha[1] * q) * between), 0)
+    between = wo[2] * length_i + wi[2] * length_o
+    inverse = 2 * math.pi * (alpha[0] * stretched) * (alpha[1] * stretched) * between
+    return jnp.where(seen, square * square / jnp.where(seen, inverse, 1), 0)
 
 
 def btdf(wi: Vec3, wo: Vec3, n_i: Real, n_o: Real, D: Real, G2: Real, F: Real) -> Scalar:

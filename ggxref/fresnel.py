@@ -45,22 +45,20 @@ def conductor(cos_i: Real, eta: Real, k: Real) -> Scalar:
     # (a + ib)² = (η + ik)² − sin²θ; the smaller of a, b comes from the product ab = ηk, as its difference cancels.
     gap = (eta - 1) * (eta + 1) - k * k
     real, imaginary = gap + c * c, eta * k
-    modulus = stable.sqrt(real * real + 4 * imaginary * imaginary)
-    large = stable.sqrt((modulus + jnp.abs(real)) / 2)
+    large_square = (stable.sqrt(real * real + 4 * imaginary * imaginary) + jnp.abs(real)) / 2
+    large = stable.sqrt(large_square)
     small = imaginary / jnp.where(large > 0, large, 1)
-    a, b = jnp.where(real >= 0, large, small), jnp.where(real >= 0, small, large)
+    a, b_square = jnp.where(real >= 0, large, small), jnp.where(real >= 0, small * small, large_square)
     total = a + c
-    solid = total > 0
     # a − c cancels as the index goes to 1; a² − c² = gap + b² does not.
-    faint = solid & (jnp.abs(gap) + b * b < c * total)
-    difference = jnp.where(faint, (gap + b * b) / jnp.where(solid, total, 1), a - c)
-    # Each numerator and denominator as a sum of squares.
-    s_plus = total * total + b * b
-    s = jnp.where(s_plus > 0, (difference * difference + b * b) / jnp.where(s_plus > 0, s_plus, 1), 0)
-    p_minus = (a * c - sin_square) ** 2 + (b * c) ** 2
-    p_plus = (a * c + sin_square) ** 2 + (b * c) ** 2
-    p = jnp.where(p_plus > 0, p_minus / jnp.where(p_plus > 0, p_plus, 1), 1)
-    return s * (1 + p) / 2
+    faint = (total > 0) & (jnp.abs(gap) + b_square < c * total)
+    difference = jnp.where(faint, (gap + b_square) / jnp.where(faint, total, 1), a - c)
+    # Each numerator and denominator as a sum of squares, and one quotient of them all.
+    s_minus, s_plus = difference * difference + b_square, total * total + b_square
+    p_minus, p_plus = ((a * c + sign * sin_square) ** 2 + b_square * c * c for sign in (-1, 1))
+    p_plus, p_minus = (jnp.where(p_plus > 0, p, 1) for p in (p_plus, p_minus))
+    whole = s_plus * p_plus
+    return jnp.where(whole > 0, s_minus * (p_plus + p_minus) / (2 * jnp.where(whole > 0, whole, 1)), 0)
 
 
 def schlick(cos_i: Real, f0: Real) -> Scalar:

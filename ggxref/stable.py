@@ -246,11 +246,37 @@ def _sqrt_jvp(primals, tangents):
     return root, jnp.where(root > 0, 0.5 / jnp.where(root > 0, root, 1), 0) * dx
 
 
+# The bits of 1/√x less those of x halved, to within 4 % of x; each Newton step doubles the digits.
+_RSQRT = {jnp.dtype("float32"): (jnp.uint32, 0x5F3759DF, 3), jnp.dtype("float64"): (jnp.uint64, 0x5FE6EB50C7B537A9, 4)}
+
+
+@jax.custom_jvp
+@_traced_once
+def rsqrt(x: Scalar) -> Scalar:
+    r"""$1/\sqrt x$ to within 1 ulp, for positive `x` in the normal range.
+
+    By Newton's method, all products: XLA cuts a loop in two at a root or a quotient that several of its results use.
+    """
+    integer, magic, steps = _RSQRT[x.dtype]
+    guess = integer(magic) - (lax.bitcast_convert_type(x, integer) >> 1)
+    root = lax.bitcast_convert_type(guess, x.dtype)
+    for _ in range(steps):
+        root = root + 0.5 * root * (1 - x * root * root)
+    return root
+
+
+@rsqrt.defjvp
+def _rsqrt_jvp(primals, tangents):
+    (x,), (dx,) = primals, tangents
+    root = rsqrt(x)
+    return root, -0.5 * root / x * dx
+
+
 @widened
 def unit(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     """The components divided by their length; the zero vector stays zero, with a zero gradient."""
     square = x * x + y * y + z * z
-    scale = 1 / jnp.sqrt(jnp.where(square > 0, square, 1))
+    scale = rsqrt(jnp.where(square > 0, square, 1))
     return x * scale, y * scale, z * scale
 
 
@@ -280,7 +306,7 @@ def _one_loop_jvp(primals, tangents):
 def direction(x: Scalar, y: Scalar, z: Scalar) -> Vec3:
     """`unit` as one array (3,): what a sampler ends with."""
     dtype = jnp.result_type(x, y, z)
-    return jnp.stack(unit(*one_loop(*(jnp.asarray(c, dtype) for c in (x, y, z)))))
+    return jnp.stack(one_loop(*unit(*(jnp.asarray(c, dtype) for c in (x, y, z)))))
 
 
 def either(condition: Bool[Array, ""], one: Vec3, other: Vec3) -> Vec3:

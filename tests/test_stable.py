@@ -154,6 +154,22 @@ def test_square_root_has_no_infinite_derivative(dtype):
     assert not np.isfinite(jax.grad(jnp.sqrt)(jnp.asarray(0, dtype)))
 
 
+def test_rsqrt(dtype):
+    """Two binades hold every case: the guess and the steps repeat with each factor of 4. The ends of the range, too."""
+    if dtype == np.float32:
+        x = np.arange(2**23, 3 * 2**23, dtype=np.uint32).view(np.float32) * np.float32(2**126)
+    else:
+        x = 2 ** rng().uniform(0, 2, N)
+    x = np.concatenate([x, [np.finfo(dtype).tiny, np.finfo(dtype).max]]).astype(dtype)
+    wide = np.longdouble if dtype == np.float64 else np.float64
+    true = 1 / np.sqrt(x.astype(wide))
+    got = np.asarray(jax.jit(jax.vmap(stable.rsqrt))(x)).astype(wide)
+    assert np.max(np.abs(got - true) / np.spacing(true.astype(dtype)).astype(wide)) < 1
+    assert np.isnan(stable.rsqrt(jnp.asarray(np.nan, dtype)))
+    slope = jax.vmap(jax.grad(stable.rsqrt))(jnp.asarray([0.25, 9], dtype))
+    np.testing.assert_allclose(slope, [-4, -1 / 54], rtol=4 * epsilon(dtype))
+
+
 @pytest.mark.parametrize("form", [stable.unit, stable.direction], ids=["unit", "direction"])
 def test_unit(form, dtype):
     v = rng().normal(size=(N, 3)).astype(dtype)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from ggxref.measure.accuracy import DTYPES, arguments
@@ -61,18 +62,35 @@ def inputs(names: Iterable[str], points: int, dtype: str = "f32", *, isotropic: 
         return [jax.device_put(drawn[name]) for name in names]
 
 
-def subject(function: Callable, args: list, dtype: str = "f32") -> Compiled:
-    """A jitted `function`, mapped over the last axis of all `args` but "alpha"."""
+def components(arrays: object) -> object:
+    """Each array of several axes, the points in the last, as a list of its components: arrays of their own."""
+    return jax.tree.map(lambda a: list(a.reshape(-1, a.shape[-1])) if a.ndim > 1 else a, arrays)
+
+
+def subject(function: Callable, args: list, dtype: str = "f32", *, apart: bool = True) -> Compiled:
+    """A jitted `function`, mapped over the last axis of all `args` but "alpha".
+
+    - `apart`: each component of arguments and result is an array of its own, as within a renderer's kernel and as Mitsuba
+      holds them; otherwise a vector is one array, which the result must be packed into.
+    """
     names = arguments(function)
     axes = tuple(None if name == "alpha" else -1 for name in names)
+    mapped = jax.vmap(function, in_axes=axes, out_axes=-1)
+    given = components(args) if apart else args
+
+    def run(given):
+        whole = [jnp.stack(g).reshape(a.shape) if isinstance(g, list) else g for g, a in zip(given, args, strict=True)]
+        result = mapped(*whole)
+        return components(result) if apart else result
+
     with jax.enable_x64(dtype == "f64"):
         start = time.perf_counter()
-        program = jax.jit(jax.vmap(function, in_axes=axes, out_axes=-1)).lower(*args).compile()
+        program = jax.jit(run).lower(given).compile()
         seconds = time.perf_counter() - start
     points = max(arg.shape[-1] for arg in args)
     sizes = program.memory_analysis()
     memory = sizes.temp_size_in_bytes / points if sizes else None
-    return Compiled(lambda: jax.block_until_ready(program(*args)), seconds, memory)
+    return Compiled(lambda: jax.block_until_ready(program(given)), seconds, memory)
 
 
 def copy(args: list) -> Callable[[], object]:

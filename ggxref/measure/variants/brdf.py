@@ -22,7 +22,7 @@ def exact_brdf(wi, wo, alpha):
 
 def half_plain(wi, wo):
     """The sum of the directions as they are, normalised."""
-    return jnp.stack(stable.unit(*(wi + wo)))
+    return jnp.stack(stable.unit(*(p + q for p, q in zip(wi, wo, strict=True))))
 
 
 def one_expression(wi, wo, alpha):
@@ -46,12 +46,13 @@ def composed_plain(wi, wo, alpha):
 
 def plain(wi, wo, alpha):
     """The one expression with nothing compensated."""
-    x, y, z = wi + wo
+    x, y, z = (p + q for p, q in zip(wi, wo, strict=True))
     square = x * x + y * y + z * z
-    q = ((x / alpha[0]) ** 2 + (y / alpha[1]) ** 2 + z * z) / square
+    stretched = (x / alpha[0]) ** 2 + (y / alpha[1]) ** 2 + z * z
     length_i, length_o = (jnp.sqrt((alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2 + w[2] ** 2) for w in (wi, wo))
     F = fresnel.conductor(jnp.sqrt(square) / 2, ETA, K)
-    return F / (2 * math.pi * (alpha[0] * q) * (alpha[1] * q) * (wo[2] * length_i + wi[2] * length_o))
+    between = wo[2] * length_i + wi[2] * length_o
+    return F * square * square / (2 * math.pi * (alpha[0] * stretched) * (alpha[1] * stretched) * between)
 
 
 HALF = (
