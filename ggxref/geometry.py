@@ -13,7 +13,8 @@ def reflect(w: Vec3, wm: Vec3) -> Vec3:
 
     dupuy2023 (5); heitz2014 §2.2 (which prints |ω_i·ω_m|: the same for the front faces that it samples).
     """
-    return 2 * stable.dot(w, wm) * wm - w
+    twice = 2 * stable.dot(w, wm)
+    return jnp.stack(stable.one_loop(*(twice * m - x for x, m in zip(w, wm, strict=True))))
 
 
 def refract(w: Vec3, wm: Vec3, eta: Real) -> Vec3:
@@ -54,8 +55,9 @@ def half_refraction(wi: Vec3, wo: Vec3, n_i: Real, n_o: Real) -> Vec3:
 
     Walter et al. 2007 (16), used by heitz2014 §2.1.
     """
-    wm = stable.direction(*stable.weighted_sum(wi, wo, n_i, n_o))
-    return stable.either(wm[2] < 0, -wm, wm)
+    x, y, z = stable.weighted_sum(wi, wo, n_i, n_o)
+    side = jnp.where(z < 0, -1, 1).astype(z.dtype)
+    return stable.direction(side * x, side * y, side * z)
 
 
 def basis(w: Vec3) -> Mat3:
