@@ -3,7 +3,8 @@
     python experiments/page_faults.py
 
 Above 32 MB glibc asks the operating system for each array anew, a page at a time. The environment is read when a process
-starts, hence one process for each setting. "donated": the result takes the place of ω_i.
+starts, hence one process for each setting. Components are arrays of their own, of 16 MB; "packed": in one of 48 MB.
+"donated": the result takes the place of ω_i.
 """
 
 import os
@@ -12,6 +13,7 @@ import subprocess
 import sys
 
 import jax
+import jax.numpy as jnp
 
 from ggxref.measure import peers, speed
 from ggxref.sampling import spherical_cap
@@ -25,13 +27,18 @@ SETTINGS = (
 
 
 def in_place(args):
-    """A subject whose result is its next argument."""
+    """A subject whose result is its next argument, a component at a time."""
     u, wi, alpha = args
-    program = jax.jit(jax.vmap(spherical_cap.sample, (-1, -1, None), -1), donate_argnums=1)
-    kept = [wi.copy()]
+    mapped = jax.vmap(spherical_cap.sample, (-1, -1, None), -1)
+
+    def run(wi, u):
+        return speed.components(mapped(jnp.stack(u), jnp.stack(wi), alpha))
+
+    program, u = jax.jit(run, donate_argnums=0), speed.components(u)
+    kept = [speed.components(wi.copy())]
 
     def call():
-        kept[0] = jax.block_until_ready(program(u, kept[0], alpha))
+        kept[0] = jax.block_until_ready(program(kept[0], u))
 
     return call
 
@@ -49,6 +56,7 @@ def main():
     subjects = {
         "fresh": speed.subject(spherical_cap.sample, args),
         "donated": in_place(args),
+        "packed": speed.subject(spherical_cap.sample, args, apart=False),
         "copy": speed.copy(args),
     }
     subjects |= {name: call for name, call in peers.mitsuba(POINTS).items() if name == "mitsuba sample"}
