@@ -2,7 +2,8 @@
 
     python experiments/kernels.py docs/speed-accuracy.md
 
-float32, one material (α = 0.3, 0.1), all kernels of a size in one interleaved run. Errors are the largest that sampling and
+float32, one material (α = 0.3, 0.1), all kernels of a size in one interleaved run, vectors as three arrays (Mitsuba's way)
+but in the row that says otherwise. Errors are the largest that sampling and
 search find in all regions. Mitsuba's `sample` returns the density too, and its conductor has three bands. Needs an idle
 machine; the extra `peers` for Mitsuba's columns.
 """
@@ -24,6 +25,7 @@ from ggxref.measure.variants.directions import cap_along
 from ggxref.sampling import bounded_cap, cross_section, spherical_cap
 from ggxref.sampling._sphere import half_in_cap, ray
 
+PACKED = "the same, packed in one array"
 MARKS = "<!-- kernels: experiments/kernels.py -->\n", "<!-- end kernels -->\n"
 SIZES = (1 << 16, 1 << 18, 1 << 20)
 POINTS = 1 << 15
@@ -39,7 +41,8 @@ def cap_apart(u, wi, alpha):
 GROUPS = (
     {
         "spherical_cap.sample": (spherical_cap.sample, "mitsuba sample", "sampling.spherical_cap.sample"),
-        "the same, components apart": (cap_apart, "mitsuba sample", "sampling.spherical_cap.sample"),
+        PACKED: (spherical_cap.sample, "mitsuba sample", "sampling.spherical_cap.sample"),
+        "the same, a loop for each component": (cap_apart, "mitsuba sample", "sampling.spherical_cap.sample"),
         "the same, along the azimuth": (cap_along, "mitsuba sample", "sampling.spherical_cap.sample"),
         "bounded_cap.sample": (bounded_cap.sample, "mitsuba sample", "sampling.bounded_cap.sample"),
         "cross_section.sample": (cross_section.sample, "mitsuba sample", "sampling.cross_section.sample"),
@@ -58,7 +61,11 @@ def times(group: dict) -> dict[str, list[tuple[speed.Timing, float | None, float
     for size in SIZES:
         wanted = {theirs for _, theirs, _ in group.values()}
         others = {name: call for name, call in peers.mitsuba(size).items() if name in wanted}
-        runs = speed.throughput({name: f for name, (f, _, _) in group.items()}, size, seconds=4, peers=others)
+        if PACKED in group:
+            args = speed.inputs(("u", "wi", "alpha"), size)
+            others[PACKED] = speed.subject(group[PACKED][0], args, apart=False)
+        ours = {name: f for name, (f, _, _) in group.items() if name != PACKED}
+        runs = speed.throughput(ours, size, seconds=4, peers=others)
         ran = {t.subject: t for t in runs}
         for name, (_, theirs, _) in group.items():
             ratio = ran[theirs].median / ran[name].median if theirs in ran else None

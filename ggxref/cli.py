@@ -1,6 +1,7 @@
 """The command line: six verbs, and the only file that sees every part of the package."""
 
 import itertools
+import os
 import shlex
 import signal
 import sys
@@ -262,6 +263,7 @@ def chart(
     points: Annotated[
         int, typer.Option(help="Points a region in float32; a million for a final figure.", min=1 << 10)
     ] = 1 << 16,
+    jobs: Annotated[int, typer.Option(help="Worker processes for what is not timed.", min=1)] = os.cpu_count() or 1,
 ) -> None:
     """Measure and draw: accuracy, speed, one against the other, where forms fail. Run it again to go on after a stop."""
     from ggxref.measure import run, tables
@@ -273,7 +275,7 @@ def chart(
     out.mkdir(parents=True, exist_ok=True)
     for one in tables.KINDS if kind == "all" else [kind]:
         with _progress(one, len(tables.KINDS[one](points))) as advance:
-            written = run.chart(one, out, points, advance)
+            written = run.chart(one, out, points, advance, jobs)
         print("\n".join(map(str, written)))
 
 

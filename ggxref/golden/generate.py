@@ -3,13 +3,9 @@
 import difflib
 import hashlib
 import json
-import multiprocessing
 import os
-import signal
 import tempfile
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +20,7 @@ from ggxref.golden.rounding import FORMATS
 from ggxref.golden.samplers import FUNCTIONS
 from ggxref.golden.solve import test
 from ggxref.golden.themes import themes
+from ggxref.workers import workers
 
 Group = tuple[str, str]
 FORMS = ("json", "text")
@@ -141,22 +138,6 @@ def order(functions: str, dtypes: str, count: int | None, seed: int, form: str =
 def belongs(function: str, name: str) -> bool:
     """Whether a name asks for the function: its own, or one of all above it."""
     return name in ("all", function) or (name not in FUNCTIONS and function.startswith(name + "."))
-
-
-@contextmanager
-def workers(jobs: int) -> Iterator[Callable[..., Any]]:
-    """`submit(f, *arguments)`, whose result is called for the value: in `jobs` processes, or at once in this one."""
-    if jobs == 1:
-        yield lambda f, *arguments: lambda: f(*arguments)
-        return
-    # Interrupts are this process's to handle; `spawn` because a fork of a process with threads may hang.
-    pool = ProcessPoolExecutor(
-        jobs, multiprocessing.get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_IGN)
-    )
-    try:
-        yield lambda f, *arguments: pool.submit(f, *arguments).result
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 def generate(

@@ -13,10 +13,11 @@ from ggxref.errors import InputError
 from ggxref.golden import callables, program, text
 from ggxref.golden.cases import mapped
 from ggxref.golden.diagnose import Diagnosis, diagnose
-from ggxref.golden.generate import Order, workers
+from ggxref.golden.generate import Order
 from ggxref.golden.reading import Test
 from ggxref.golden.rounding import Format, decode, is_nan, to_float, to_hex
 from ggxref.golden.verdict import Failure, Verdict, judge
+from ggxref.workers import workers
 
 
 @dataclass

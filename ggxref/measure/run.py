@@ -3,27 +3,41 @@
 import csv
 import io
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 from ggxref.files import write_atomically
 from ggxref.measure.speed import machine
-from ggxref.measure.tables import KINDS, Rows
+from ggxref.measure.tables import KINDS, Rows, timed
+from ggxref.workers import workers
 
 
 def _pieces_of(out: Path, kind: str, points: int) -> Path:
     return out / ".pieces" / f"{kind}-{points}"
 
 
-def collect(kind: str, out: Path, points: int) -> Iterator[Rows]:
-    """The rows of each piece in turn: read from an earlier run's file, or measured and then kept."""
+def _rows(kind: str, name: str, points: int) -> Rows:
+    return KINDS[kind](points)[name]()
+
+
+def collect(kind: str, out: Path, points: int, jobs: int, advance: Callable[[int], None]) -> Rows:
+    """The rows of all pieces: read from an earlier run's files, or measured and then kept.
+
+    Pieces that time nothing are measured in `jobs` processes side by side, the others alone and after them.
+    """
     folder = _pieces_of(out, kind, points)
     folder.mkdir(parents=True, exist_ok=True)
-    for name, piece in KINDS[kind](points).items():
-        path = folder / f"{name}.json"
-        if not path.exists():
-            write_atomically(path, json.dumps(piece()))
-        yield json.loads(path.read_text())
+    paths = {name: folder / f"{name}.json" for name in KINDS[kind](points)}
+    missing = [name for name, path in paths.items() if not path.exists()]
+    advance(len(paths) - len(missing))
+    for alone in (False, True):
+        names = [name for name in missing if timed(kind, name) == alone]
+        with workers(1 if alone else min(jobs, max(len(names), 1))) as submit:
+            running = {name: submit(_rows, kind, name, points) for name in names}
+            for name in names:
+                write_atomically(paths[name], json.dumps(running.pop(name)()))
+                advance(1)
+    return [row for path in paths.values() for row in json.loads(path.read_text())]
 
 
 def table(rows: Rows) -> str:
@@ -36,14 +50,11 @@ def table(rows: Rows) -> str:
     return text.getvalue()
 
 
-def chart(kind: str, out: Path, points: int, advance: Callable[[int], None]) -> list[Path]:
+def chart(kind: str, out: Path, points: int, advance: Callable[[int], None], jobs: int = 1) -> list[Path]:
     """Write `kind`.csv, .png and .svg into `out`, with the advice table beside a `pareto`; the paths written."""
     from ggxref.measure import advice, charts
 
-    rows: Rows = []
-    for part in collect(kind, out, points):
-        rows += part
-        advance(1)
+    rows = collect(kind, out, points, jobs, advance)
     files: dict[str, bytes | str] = {"csv": table(rows)} | charts.render(kind, rows, machine())
     written = []
     for suffix, data in files.items():

@@ -192,3 +192,8 @@ KINDS: dict[str, Callable[[int], Pieces]] = {
     "variance": efficiency,
     "gradient": gradient,
 }
+
+
+def timed(kind: str, name: str) -> bool:
+    """Whether a piece measures time, and so must run alone."""
+    return kind in ("speed", "pareto") or name == "times"
