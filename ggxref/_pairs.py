@@ -10,8 +10,8 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
+from ggxref._errorfree import collected, quotient, two_product
 from ggxref._types import Mat3, Scalar
-from ggxref.stable import _collected, _quotient, _two_product
 
 Pair = tuple[Scalar, Scalar]
 Triple = tuple[Scalar, Scalar, Scalar]
@@ -21,7 +21,7 @@ Pairs = tuple[Pair, Pair, Pair]
 @jax.custom_jvp
 def dot(a: tuple[Scalar, ...], b: tuple[Scalar, ...]) -> Pair:
     """`a · b`: the rest leaves out only what is below the square of ε."""
-    value, errors = _collected([_two_product(x, y) for x, y in zip(a, b, strict=True)])
+    value, errors = collected([two_product(x, y) for x, y in zip(a, b, strict=True)])
     return value, sum(errors, jnp.zeros_like(value))
 
 
@@ -89,7 +89,7 @@ def determinant(A: Mat3) -> Pair:
 @jax.custom_jvp
 def tangent_square(x: Scalar, y: Scalar, z: Scalar, ax: Scalar, ay: Scalar) -> Pair:
     r"""$(x^2/\alpha_x^2 + y^2/\alpha_y^2)/z^2$, `z > 0`: an exponent, whose error is one of its exponential times as large."""
-    (p, p_rest), (q, q_rest) = _quotient(x, ax), _quotient(y, ay)
+    (p, p_rest), (q, q_rest) = quotient(x, ax), quotient(y, ay)
     square, rest = dot((p, q), (p, q))
     return _over((square, rest + 2 * (p * p_rest + q * q_rest)), dot((z,), (z,)))
 
@@ -105,7 +105,7 @@ def _tangent_square_jvp(primals, tangents):
 
 def height_square(x: Scalar, y: Scalar, z: Scalar, ax: Scalar, ay: Scalar) -> Pair:
     r"""$z^2/(\alpha_x^2 x^2 + \alpha_y^2 y^2)$, `x` and `y` not both 0: an exponent, without a derivative."""
-    (p, p_rest), (q, q_rest) = _two_product(ax, x), _two_product(ay, y)
+    (p, p_rest), (q, q_rest) = two_product(ax, x), two_product(ay, y)
     square, rest = dot((p, q), (p, q))
     value, rest = _over(dot((z,), (z,)), (square, rest + 2 * (p * p_rest + q * q_rest)))
     return lax.stop_gradient(value), lax.stop_gradient(rest)
@@ -114,5 +114,5 @@ def height_square(x: Scalar, y: Scalar, z: Scalar, ax: Scalar, ay: Scalar) -> Pa
 def _over(a: Pair, b: Pair) -> Pair:
     """The quotient; its rest is that of whatever the first division gave."""
     value = a[0] / b[0]
-    product, error = _two_product(value, b[0])
+    product, error = two_product(value, b[0])
     return value, (((a[0] - product) - error) + (a[1] - value * b[1])) / b[0]

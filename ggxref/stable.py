@@ -13,41 +13,10 @@ import jax.numpy as jnp
 from jax import Array, lax
 from jaxtyping import Bool, Float
 
+from ggxref._errorfree import collected, quotient, traced_once, two_product, two_sum
 from ggxref._types import Real, Scalar, Vec2, Vec3
 
 Components = Float[Array, " n"] | tuple[Float[Array, "..."], ...]
-
-# Bits of the significand that the high half keeps, so that a product of two halves is exact.
-_HIGH = {jnp.dtype("float32"): (jnp.uint32, 0xFFFFF000), jnp.dtype("float64"): (jnp.uint64, 0xFFFFFFFFF8000000)}
-
-
-# Traced once for each dtype and shape, wherever it is used.
-_traced_once = functools.partial(jax.jit, inline=True)
-
-
-@_traced_once
-def _split(a):
-    """`a` as the exact sum of a high half and a low half, each short enough for products without rounding.
-
-    The bits are masked, not subtracted as Veltkamp does: the compiler contracts `c - (c - a)` to FMAs.
-    """
-    integer, mask = _HIGH[a.dtype]
-    high = lax.bitcast_convert_type(lax.bitcast_convert_type(a, integer) & integer(mask), a.dtype)
-    return high, a - high
-
-
-@_traced_once
-def _two_product(a, b):
-    p = a * b
-    (ah, al), (bh, bl) = _split(a), _split(b)
-    return p, ((ah * bh - p) + ah * bl + al * bh) + al * bl
-
-
-@_traced_once
-def _two_sum(a, b):
-    s = a + b
-    t = s - a
-    return s, (a - (s - t)) + (b - t)
 
 
 def widened(function: Callable) -> Callable:
@@ -70,24 +39,14 @@ def widened(function: Callable) -> Callable:
     return in_float32
 
 
-def _collected(products):
-    """The rounded sum of `(value, error)` pairs, and everything that it leaves out."""
-    (total, error), *others = products
-    errors = [error]
-    for value, error in others:
-        total, lost = _two_sum(total, value)
-        errors += [error, lost]
-    return total, errors
-
-
 @functools.partial(jax.custom_jvp, nondiff_argnums=(2,))
 def _dot(a, b, fold):
-    total, errors = _collected([_two_product(x, y) for x, y in zip(a, b, strict=True)])
+    total, errors = collected([two_product(x, y) for x, y in zip(a, b, strict=True)])
     if fold == 2:
         return total + sum(errors)
     rest = 0
     for error in errors:  # these are summed the same way
-        total, lost = _two_sum(total, error)
+        total, lost = two_sum(total, error)
         rest = rest + lost
     return total + rest
 
@@ -139,7 +98,7 @@ def excess(w: Vec3) -> Scalar:
 
 @jax.custom_jvp
 def _excess(x, y, z):
-    total, errors = _collected([_two_product(c, c) for c in (z, x, y)])
+    total, errors = collected([two_product(c, c) for c in (z, x, y)])
     return ((total - 1) + sum(errors)) / 2
 
 
@@ -166,7 +125,7 @@ def weighted_sum(a: Vec3, b: Vec3, n_a: Real, n_b: Real) -> tuple[Scalar, Scalar
     longer_a, longer_b = n_a * excess(a), n_b * excess(b)
 
     def component(x, y):
-        total, errors = _collected([_two_product(n_a, x), _two_product(n_b, y)])
+        total, errors = collected([two_product(n_a, x), two_product(n_b, y)])
         return total + (sum(errors) - (x * longer_a + y * longer_b))
 
     x, y, z = map(component, a, b)
@@ -191,8 +150,8 @@ def scaled_square(w: Vec3, alpha: Vec2) -> Scalar:
 
 @jax.custom_jvp
 def _scaled_square(x, y, ax, ay):
-    (p, p_rest), (q, q_rest) = _two_product(ax, x), _two_product(ay, y)
-    total, errors = _collected([_two_product(c, c) for c in (p, q)])
+    (p, p_rest), (q, q_rest) = two_product(ax, x), two_product(ay, y)
+    total, errors = collected([two_product(c, c) for c in (p, q)])
     return total + (sum(errors) + 2 * (p * p_rest + q * q_rest))
 
 
@@ -202,17 +161,10 @@ def _scaled_square_jvp(primals, tangents):
     return _scaled_square(*primals), 2 * (ax * x * (ax * dx + x * dax) + ay * y * (ay * dy + y * day))
 
 
-@_traced_once
-def _quotient(x, a):
-    q = x / a
-    p, error = _two_product(q, a)
-    return q, ((x - p) - error) / a
-
-
 @jax.custom_jvp
 def _stretched_square(x, y, z, ax, ay):
-    (p, p_rest), (q, q_rest) = _quotient(x, ax), _quotient(y, ay)
-    total, errors = _collected([_two_product(c, c) for c in (p, q, z)])
+    (p, p_rest), (q, q_rest) = quotient(x, ax), quotient(y, ay)
+    total, errors = collected([two_product(c, c) for c in (p, q, z)])
     longer = 2 * _excess(x, y, z)
     square = jnp.where(longer > -1, 1 + longer, 1)  # ‖w‖², but for the zero vector
     return total + (sum(errors) + 2 * (p * p_rest + q * q_rest) - total * (longer / square))
@@ -251,7 +203,7 @@ _RSQRT = {jnp.dtype("float32"): (jnp.uint32, 0x5F3759DF, 3), jnp.dtype("float64"
 
 
 @jax.custom_jvp
-@_traced_once
+@traced_once
 def rsqrt(x: Scalar) -> Scalar:
     r"""$1/\sqrt x$ to within 1 ulp, for positive `x` in the normal range.
 
@@ -281,7 +233,7 @@ def unit(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
 
 
 @jax.custom_jvp
-@_traced_once
+@traced_once
 def one_loop(*components: Scalar) -> tuple[Scalar, ...]:
     """The components as they are, of one dtype and shape, all computed in the same pass over the points.
 
