@@ -5,7 +5,9 @@ orthogonal give one distribution of normals. `size` is $C_e$ (walter2014 §2.4);
 """
 
 import math
+from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 from jax import lax
 
@@ -49,6 +51,11 @@ def length(x: Real, y: Real, z: Real) -> Scalar:
     return stable.sqrt(x * x + y * y + z * z)
 
 
+def normal_square(A: Mat3) -> Scalar:
+    r"""$\|A n\|^2$. `A`: (3, 3)."""
+    return A[0, 2] ** 2 + A[1, 2] ** 2 + A[2, 2] ** 2
+
+
 def shape_matrix(alpha: Vec2, angles: Vec3) -> Mat3:
     r"""$A = S R_x(\theta_x) R_y(\theta_y) R_z(\theta_z)$ with $S = \mathrm{diag}(\alpha_x, \alpha_y, 1)$.
 
@@ -66,17 +73,55 @@ def shape_matrix(alpha: Vec2, angles: Vec3) -> Mat3:
     return jnp.stack(rows)
 
 
-def canonical_terms(A: Mat3) -> tuple[Scalar, Scalar, Scalar, Scalar, Scalar]:
-    """The numbers of `canonical`: `(c00, c10, c11, ex, ey)`."""
+class Canonical(NamedTuple):
+    r"""The five numbers of `canonical`: $C$, lower triangular, and $e$."""
+
+    c00: Scalar
+    c10: Scalar
+    c11: Scalar
+    ex: Scalar
+    ey: Scalar
+
+
+@jax.custom_jvp
+def canonical_terms(A: Mat3) -> Canonical:
+    """`canonical` as its five numbers. `A`: (3, 3), non-singular, of either sign."""
+    return _canonical_and_normal(A)[0]
+
+
+def _canonical_and_normal(A):
+    """The five numbers, then a1 x a3 of A's columns and det A."""
     a1, a2, a3 = (tuple(A[i, j] for i in range(3)) for j in range(3))
     square = _pairs.rounded(_pairs.dot(a3, a3))
     ex, ey = (_pairs.rounded(_pairs.dot(a, a3)) / square for a in (a1, a2))
     # The parts of a1 and a2 perpendicular to a3 have the lengths |a1 x a3| / |a3| and so on.
     n1, n2 = (tuple(map(_pairs.rounded, _pairs.cross(a, a3))) for a in (a1, a2))
-    n1_length = length(*n1)
+    n1_length, det = length(*n1), determinant(A)
     c10 = _pairs.rounded(_pairs.dot(n1, n2)) / (n1_length * square)
-    c11 = jnp.abs(determinant(A)) / (n1_length * jnp.sqrt(square))
-    return n1_length / square, c10, c11, ex, ey
+    c11 = jnp.abs(det) / (n1_length * jnp.sqrt(square))
+    return Canonical(n1_length / square, c10, c11, ex, ey), n1, det
+
+
+@canonical_terms.defjvp
+def _canonical_terms_jvp(primals, tangents):
+    r"""With $A = \|A n\|\,Q M$, Q orthogonal and M canonical: what $Q^T dA/\|A n\|$ is beyond a turn and a scale of M."""
+    (A,), (dA,) = primals, tangents
+    terms, n1, det = _canonical_and_normal(A)
+    c00, c10, c11, ex, ey, det, *n1 = stable.one_loop(*terms, det, *n1)
+    norm, up, (x, y, z) = length(*A[:, 2]), stable.unit(*A[:, 2]), stable.unit(*n1)
+    q1 = up[1] * z - up[2] * y, up[2] * x - up[0] * z, up[0] * y - up[1] * x
+    q2 = tuple(jnp.where(det < 0, c, -c) for c in (x, y, z))
+    g = [[(q[0] * a[0] + q[1] * a[1] + q[2] * a[2]) / norm for a in dA.T] for q in (q1, q2, up)]
+    (g11, g12, g13), (g21, g22, g23), (g31, g32, g33) = g
+    turn = (g21 - ex * g23) / c00
+    changes = (
+        g11 - ex * g13 - c00 * g33,
+        g12 - ey * g13 - c10 * g33 + c11 * turn,
+        g22 - ey * g23 - c11 * g33 - c10 * turn,
+        g31 - ex * g33 + c00 * g13,
+        g32 - ey * g33 + c10 * g13 + c11 * g23,
+    )
+    return Canonical(c00, c10, c11, ex, ey), Canonical(*changes)
 
 
 @stable.widened
@@ -142,8 +187,20 @@ def reciprocal_scale(x: Scalar) -> Scalar:
 def inverse_square(wm: Vec3, A: Mat3) -> tuple[Scalar, Scalar]:
     r"""$\|A^{-T}\omega_m\|^2/\|\omega_m\|^2$ and $|\det A|$, each rounded once; the first's derivative is that of the numerator.
 
+    - `wm`: unit, (3,), anywhere on the sphere. `A`: (3, 3), non-singular, of either sign.
+
     Under skew $\mathrm{cof}(A)\,\omega_m$ cancels at the peak of the density: minors and product are in two words.
     """
+    return _inverse_square(wm, A)
+
+
+@jax.custom_jvp
+def _inverse_square(wm, A):
+    return _inverse_square_and_parts(wm, A)[:2]
+
+
+def _inverse_square_and_parts(wm, A):
+    r"""The two of `inverse_square`, then d, $d A^{-T}\omega_m$ and the rows of $d A^{-T}$, where d is $\det A$ but for a power of two."""
     w, minors = tuple(wm), _pairs.cofactor(A)
     det = _pairs.dot_of_pairs(minors[0], tuple(A[0]))
     # Divided before they are squared: cof m is α² at the peak.
@@ -153,11 +210,24 @@ def inverse_square(wm: Vec3, A: Mat3) -> tuple[Scalar, Scalar]:
     x, y, z = (x for x, _ in image)
     total, rest = _pairs.dot((x, y, z), (x, y, z))
     rest = rest + 2 * (x * image[0][1] + y * image[1][1] + z * image[2][1])
-    longer = 2 * lax.stop_gradient(stable.excess(wm))
+    longer = 2 * stable.excess(wm)
     square = jnp.where(longer > -1, 1 + longer, 1)  # ‖w‖², but for the zero vector
     d_square, d_square_rest = _pairs.dot((d,), (d,))
     smaller = (d_square_rest + 2 * d * d_rest) / d_square + longer / square
-    return (total + (rest - total * smaller)) / d_square, jnp.abs(_pairs.rounded(det))
+    q = (total + (rest - total * smaller)) / d_square
+    return q, jnp.abs(_pairs.rounded(det)), d, (x, y, z), [[_pairs.rounded(p) * scale for p in row] for row in minors]
+
+
+@_inverse_square.defjvp
+def _inverse_square_jvp(primals, tangents):
+    r"""$2v\cdot(d\omega_m - dA^T y)$ with $y = A^{-T}\omega_m$, $v = A^{-1}y$, and $|\det A|\,\mathrm{tr}(A^{-1}dA)$."""
+    dw, dA = tangents
+    q, det, d, y, (a, b, c) = _inverse_square_and_parts(*primals)
+    q, det, d, *rest = stable.one_loop(q, det, d, *y, *a, *b, *c)
+    y, inverse = [p / d for p in rest[:3]], [[p / d for p in rest[i : i + 3]] for i in (3, 6, 9)]
+    v = [sum(inverse[i][j] * y[i] for i in range(3)) for j in range(3)]
+    change = sum(v[j] * (dw[j] - sum(y[i] * dA[i, j] for i in range(3))) for j in range(3))
+    return (q, det), (2 * change, det * sum(inverse[i][j] * dA[i, j] for i in range(3) for j in range(3)))
 
 
 @stable.widened
@@ -183,22 +253,46 @@ def projected_area(w: Vec3, A: Mat3, size: Real) -> Scalar:
     return math.pi * size**2 * length(*times_exactly(A, w)) / jnp.abs(determinant(A))
 
 
-def _lune_sum(au, av):
-    r"""$\|Au\|\|Av\| + Au\cdot Av$, the factor of every lune, and $\|Av\|$; exact also where $Au \approx -Av$.
+@jax.custom_jvp
+def _lune_sum(au: _pairs.Pairs, av: _pairs.Pairs) -> tuple[Scalar, Scalar]:
+    r"""$T = \|Au\|\|Av\| + Au\cdot Av$, the factor of every lune, and $T/\|Av\|$; exact also where $Au \approx -Av$.
 
     There the sum cancels, and $\|Au \times Av\|^2 / (\|Au\|\|Av\| - Au\cdot Av)$ does not, of vectors in two words: rounded, they
     would have lost the angle between them.
     """
+    return _lune_sum_and_normal(au, av)[:2]
+
+
+def _lune_sum_and_normal(au, av):
+    """The two of `_lune_sum`, then ‖Au‖, ‖Av‖ and Au × Av."""
     u, v = ([_pairs.rounded(p) for p in a] for a in (au, av))
-    v_length = length(*v)
-    product = length(*u) * v_length
+    u_length, v_length = length(*u), length(*v)
+    product = u_length * v_length
     cosine = u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
     x, y, z = _pairs.cross_of_pairs(au, av)
-    # Down to 120° the sum keeps its digits. The inner `where` keeps the branch not taken away from 0/0 at u = v.
+    # Down to 120° the sum keeps its digits.
     obtuse = cosine < -product / 2
-    return jnp.where(
-        obtuse, (x * x + y * y + z * z) / jnp.where(obtuse, product - cosine, 1), product + cosine
-    ), v_length
+    total = jnp.where(obtuse, (x * x + y * y + z * z) / jnp.where(obtuse, product - cosine, 1), product + cosine)
+    return total, total / v_length, u_length, v_length, (x, y, z)
+
+
+@_lune_sum.defjvp
+def _lune_sum_jvp(primals, tangents):
+    r"""Of T by $u$: $\|v\|\hat u + v = (T u + n \times u)/\|u\|^2$, $n = u \times v$, whose terms are perpendicular; $T/\|v\|$ keeps,
+    by v, only the second."""
+    total, ratio, u_length, v_length, n = _lune_sum_and_normal(*primals)
+    total, ratio, u_length, v_length, *n = stable.one_loop(total, ratio, u_length, v_length, *n)
+    (u, v), (du, dv) = ([[value for value, _ in a] for a in pair] for pair in (primals, tangents))
+
+    def along(a, da):
+        return a[0] * da[0] + a[1] * da[1] + a[2] * da[2]
+
+    def across(a, da):
+        x, y, z = (n[j] * a[k] - n[k] * a[j] for j, k in ((1, 2), (2, 0), (0, 1)))
+        return along((x, y, z), da)
+
+    by_u, by_v = (total * along(u, du) + across(u, du)) / u_length**2, -across(v, dv) / v_length**2
+    return (total, ratio), (by_u + by_v + ratio * along(v, dv) / v_length, (by_u + by_v) / v_length)
 
 
 @stable.widened
@@ -210,8 +304,8 @@ def lune_area(u: Vec3, v: Vec3, A: Mat3, size: Real) -> Scalar:
 
     walter2014 (28).
     """
-    total, v_length = _lune_sum(_pairs.times(A, tuple(u)), _pairs.times(A, tuple(v)))
-    return math.pi * size**2 * total / (2 * jnp.abs(determinant(A)) * v_length)
+    _, ratio = _lune_sum(_pairs.times(A, tuple(u)), _pairs.times(A, tuple(v)))
+    return math.pi * size**2 * ratio / (2 * jnp.abs(determinant(A)))
 
 
 def mean_normal(A: Mat3) -> Vec3:
@@ -231,4 +325,4 @@ def sigma(w: Vec3, A: Mat3) -> Scalar:
     x, y, z = A[:, 2]
     zero = jnp.zeros_like(z)
     total, _ = _lune_sum(_pairs.times(A, tuple(w)), ((x, zero), (y, zero), (z, zero)))
-    return total / (2 * (x * x + y * y + z * z))
+    return total / (2 * normal_square(A))

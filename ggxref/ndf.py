@@ -88,7 +88,11 @@ def ellipsoid(wm: Vec3, A: Mat3) -> Scalar:
 
     walter2014 (1).
     """
-    q, det = inverse_square(wm, A)
+    return ellipsoid_of(wm, A, *inverse_square(wm, A))
+
+
+def ellipsoid_of(wm: Vec3, A: Mat3, q: Scalar, det: Scalar) -> Scalar:
+    """`ellipsoid` from what `inverse_square(wm, A)` gave."""
     An = jnp.sqrt(stable.dot(A[:, 2], A[:, 2]))
     D = 1 / (math.pi * (det * q) * (An * q))
     return jnp.where(wm[2] > 0, D, 0)

@@ -10,9 +10,9 @@ import jax.numpy as jnp
 
 from ggxref import ndf, stable
 from ggxref._types import Mat3, Scalar, Turn, Vec2, Vec3
-from ggxref.ellipsoid import canonical_terms, inverse_square, length
+from ggxref.ellipsoid import Canonical, canonical_terms, inverse_square, length, normal_square
 from ggxref.sampling._half_vector import rise_and_fall
-from ggxref.sampling.ellipsoid_cap import Canonical, from_sphere, half_vector, to_sphere
+from ggxref.sampling.ellipsoid_cap import from_sphere, half_vector, to_sphere
 
 
 def _largest_q(wi: Vec3, A: Canonical):
@@ -51,7 +51,7 @@ def bound(wi: Vec3, A: Mat3) -> Scalar:
     i = to_sphere(wi, terms)
     c_square, q = _largest_q(wi, terms)
     # i_z/(‖Aωi‖ Q) − i'_z with i'_z = (e·ωi + i_z)/‖Aωi‖.
-    fall = terms[3] * wi[0] + terms[4] * wi[1] + wi[2] * (q / (c_square + q))
+    fall = terms.ex * wi[0] + terms.ey * wi[1] + wi[2] * (q / (c_square + q))
     return -jnp.where(wi[2] > 0, fall, i[2]) / length(*i)
 
 
@@ -81,7 +81,7 @@ def pdf(wm: Vec3, wi: Vec3, A: Mat3) -> Scalar:
     cosine, cut = stable.cosine(wi, wm), _cut(wi, terms)
     slack = 1 - 64 * float(jnp.finfo(wm.dtype).eps)
     # A is canonical up to a rotation and the factor ‖A n‖.
-    An_square = A[0, 2] ** 2 + A[1, 2] ** 2 + A[2, 2] ** 2
-    inside = (cosine > 0) & (2 * cosine * wm[2] >= slack * cut * (An_square * inverse_square(wm, A)[0]))
+    q, det = inverse_square(wm, A)
+    inside = (cosine > 0) & (2 * cosine * wm[2] >= slack * cut * (normal_square(A) * q))
     area = rise - cut
-    return jnp.where(inside, 2 * ndf.ellipsoid(wm, A) * cosine / jnp.where(inside, area, 1), 0)
+    return jnp.where(inside, 2 * ndf.ellipsoid_of(wm, A, q, det) * cosine / jnp.where(inside, area, 1), 0)

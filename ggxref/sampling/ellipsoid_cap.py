@@ -4,14 +4,11 @@ import jax.numpy as jnp
 
 from ggxref import _pairs, stable
 from ggxref._types import Mat3, Real, Scalar, Turn, Vec2, Vec3
-from ggxref.ellipsoid import canonical_terms, reciprocal_scale
+from ggxref.ellipsoid import Canonical, canonical_terms, reciprocal_scale
 from ggxref.sampling._half_vector import half_in_cap
 from ggxref.sampling._visible import pdf_ellipsoid as pdf
 
 __all__ = ["pdf", "sample"]
-
-Canonical = tuple[Scalar, Scalar, Scalar, Scalar, Scalar]
-"""`(c00, c10, c11, ex, ey)` of a canonical `A`."""
 
 
 def to_sphere(wi: Vec3, A: Canonical) -> tuple[Scalar, Scalar, Scalar]:

@@ -6,7 +6,7 @@ from jaxtyping import Array, Float, Int
 
 from ggxref import _pairs, stable
 from ggxref._types import Mat3, Scalar, Vec2, Vec3
-from ggxref.ellipsoid import cofactor, length, times, times_exactly
+from ggxref.ellipsoid import cofactor, length, normal_square, times, times_exactly
 from ggxref.geometry import basis
 from ggxref.sampling._sphere import Incident, crescent
 from ggxref.sampling._visible import pdf_ellipsoid as pdf
@@ -66,7 +66,7 @@ def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:
     p = stable.one_loop(x, y, z)
     # The components are p·a for the columns a of A. Of each, the share of An takes `height`, which is exact towards the
     # horizon and has its sign right, where p has lost it; only the rest is left to p.
-    An, square = (A[0, 2], A[1, 2], A[2, 2]), A[0, 2] ** 2 + A[1, 2] ** 2 + A[2, 2] ** 2
+    An, square = (A[0, 2], A[1, 2], A[2, 2]), normal_square(A)
     raised = norm_n * height
 
     def component(a):
