@@ -1,8 +1,12 @@
 """D, G and F put together: BRDF, BTDF [1/sr] and the weights of the samplers, from their values."""
 
 import math
+from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
+from jax import Array
+from jaxtyping import Bool
 
 from ggxref import geometry, jacobian, stable
 from ggxref._types import Real, Scalar, Vec2, Vec3
@@ -37,6 +41,21 @@ def brdf_ggx(wi: Vec3, wo: Vec3, alpha: Vec2) -> Scalar:
     tokuyoshi2024's D and dupuy2023 (13) in walter2014 (4): the heights of G2 and of the denominator cancel, h is never
     normalised, and no digit is lost where $\omega_o$ is nearly $-\omega_i$. A third of the composition's time.
     """
+    return _brdf_ggx(wi, wo, alpha)
+
+
+class _Mirrored(NamedTuple):
+    h: tuple[Scalar, Scalar, Scalar]  # ωi + ωo, scaled by a power of two
+    scale: Scalar
+    square: Scalar  # of the scaled h
+    stretched: Scalar  # q times that
+    length_i: Scalar
+    length_o: Scalar
+    between: Scalar
+    seen: Bool[Array, ""]
+
+
+def _mirrored(wi, wo, alpha):
     x, y, z = stable.unit_sum(wi, wo)
     # The quotient q knows no length of h, whose squares may underflow near the horizon.
     scale = reciprocal_scale(jnp.abs(x) + jnp.abs(y) + jnp.abs(z))
@@ -46,8 +65,40 @@ def brdf_ggx(wi: Vec3, wo: Vec3, alpha: Vec2) -> Scalar:
     stretched = (x / alpha[0]) ** 2 + (y / alpha[1]) ** 2 + z * z
     length_i, length_o = (length(alpha[0] * w[0], alpha[1] * w[1], w[2]) for w in (wi, wo))
     between = wo[2] * length_i + wi[2] * length_o
-    inverse = 2 * math.pi * (alpha[0] * stretched) * (alpha[1] * stretched) * between
-    return jnp.where(seen, square * square / jnp.where(seen, inverse, 1), 0)
+    return _Mirrored((x, y, z), scale, square, stretched, length_i, length_o, between, seen)
+
+
+@jax.custom_jvp
+def _brdf_ggx(wi, wo, alpha):
+    m = _mirrored(wi, wo, alpha)
+    inverse = 2 * math.pi * (alpha[0] * m.stretched) * (alpha[1] * m.stretched) * m.between
+    return jnp.where(m.seen, m.square * m.square / jnp.where(m.seen, inverse, 1), 0)
+
+
+@_brdf_ggx.defjvp
+def _brdf_ggx_jvp(primals, tangents):
+    """Each partial derivative as the value times a quotient: near the horizon the value's square is beyond the dtype's range.
+
+    Where the derivative is, too, it is the end of the range, so that no sum of derivatives is inf − inf.
+    """
+    (wi, wo, alpha), (di, do, dalpha) = primals, tangents
+    value, m = _brdf_ggx(*primals), _mirrored(*primals)
+    square, stretched, between = (jnp.where(m.seen, x, 1) for x in (m.square, m.stretched, m.between))
+    q, end = stretched / square, float(jnp.finfo(value.dtype).max) / 64
+    _, dh = jax.jvp(stable.unit_sum, (wi, wo), (di, do))
+    factors, none = (alpha[0], alpha[1], jnp.ones_like(value)), jnp.zeros_like(value)
+    terms = []
+    for c, dc, a, da in zip(m.h, dh, factors, (*dalpha, none), strict=True):
+        p = c / a
+        terms.append((-4 * (value / q) * ((p / a - q * c) / square) * m.scale, dc))
+        terms.append((value / a * (4 * (p * p / stretched) - 1), da))
+    for w, dw, z, own, other in ((wi, di, wo[2], m.length_i, m.length_o), (wo, do, wi[2], m.length_o, m.length_i)):
+        part = -value * (z / between) / jnp.where(own > 0, own, 1)
+        for c, dc, a, da in zip(w, dw, factors, (*dalpha, none), strict=True):
+            terms += [(part * (a * a * c), dc), (part * (a * c * c), da)]
+        terms.append((-value * (other / between), dw[2]))
+    change = sum((jnp.clip(by, -end, end) * d for by, d in terms), jnp.zeros_like(value))
+    return value, jnp.where(m.seen, change, 0)
 
 
 def btdf(wi: Vec3, wo: Vec3, n_i: Real, n_o: Real, D: Real, G2: Real, F: Real) -> Scalar:
@@ -75,7 +126,9 @@ def weight_normals(wi: Vec3, wm: Vec3, G2: Real) -> Scalar:
 
     heitz2014 §2.2, algorithm 1 (table 2 leaves out |ω_i·n|).
     """
-    return _over(jnp.abs(stable.cosine(wi, wm)) * G2, jnp.abs(wi[2]) * jnp.abs(wm[2]))
+    z = jnp.abs(wi[2]) * jnp.abs(wm[2])
+    share = stable.over_heights(tuple(wi), tuple(wm), stable.cosine(wi, wm))
+    return jnp.where(z == 0, 0, jnp.abs(share) * G2)
 
 
 def weight_visible(g1_i: Real, g2: Real, F: Real) -> Scalar:

@@ -4,6 +4,7 @@ The shape matrix `A` is (3, 3) and non-singular, with $\det A$ inside the dtype'
 orthogonal give one distribution of normals. `size` is $C_e$ (walter2014 §2.4); areas are in its unit squared.
 """
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -56,6 +57,24 @@ def normal_square(A: Mat3) -> Scalar:
     return A[0, 2] ** 2 + A[1, 2] ** 2 + A[2, 2] ** 2
 
 
+def reciprocal_scale(x: Scalar) -> Scalar:
+    """A power of two near 1/|x|: a factor that rounds nothing."""
+    integer = jnp.int32 if x.dtype == jnp.float32 else jnp.int64
+    one, infinity = (lax.bitcast_convert_type(jnp.asarray(c, x.dtype), integer) for c in (1, jnp.inf))
+    # By its exponent's bits: a division, which XLA computes once for all its uses, would cut the expression in pieces.
+    scale = 2 * one - (lax.bitcast_convert_type(x, integer) & infinity)
+    least = lax.bitcast_convert_type(jnp.asarray(jnp.finfo(x.dtype).tiny, x.dtype), integer)
+    return lax.stop_gradient(lax.bitcast_convert_type(jnp.maximum(scale, least), x.dtype))
+
+
+def near_one(A: Mat3) -> tuple[Mat3, Scalar]:
+    """`A` times a power of two that brings its largest number to about 1, and that factor: `c A` is the same distribution, but
+    its minors, of which there are products, would leave the range for c = 1e12.
+    """
+    scale = reciprocal_scale(functools.reduce(jnp.maximum, [jnp.abs(x) for row in A for x in row]))
+    return A * scale, scale
+
+
 def shape_matrix(alpha: Vec2, angles: Vec3) -> Mat3:
     r"""$A = S R_x(\theta_x) R_y(\theta_y) R_z(\theta_z)$ with $S = \mathrm{diag}(\alpha_x, \alpha_y, 1)$.
 
@@ -73,6 +92,15 @@ def shape_matrix(alpha: Vec2, angles: Vec3) -> Mat3:
     return jnp.stack(rows)
 
 
+def _beside_the_pole(A):
+    """|a3|², e, and a1 x a3 and a2 x a3 of A's columns: |a3| times the parts of a1 and a2 perpendicular to a3, turned."""
+    a1, a2, a3 = (tuple(A[i, j] for i in range(3)) for j in range(3))
+    square = _pairs.rounded(_pairs.dot(a3, a3))
+    ex, ey = (_pairs.rounded(_pairs.dot(a, a3)) / square for a in (a1, a2))
+    n1, n2 = (tuple(map(_pairs.rounded, _pairs.cross(a, a3))) for a in (a1, a2))
+    return square, ex, ey, n1, n2
+
+
 class Canonical(NamedTuple):
     r"""The five numbers of `canonical`: $C$, lower triangular, and $e$."""
 
@@ -83,26 +111,26 @@ class Canonical(NamedTuple):
     ey: Scalar
 
 
-@jax.custom_jvp
 def canonical_terms(A: Mat3) -> Canonical:
     """`canonical` as its five numbers. `A`: (3, 3), non-singular, of either sign."""
+    return _canonical_terms(near_one(A)[0])
+
+
+@jax.custom_jvp
+def _canonical_terms(A):
     return _canonical_and_normal(A)[0]
 
 
 def _canonical_and_normal(A):
     """The five numbers, then a1 x a3 of A's columns and det A."""
-    a1, a2, a3 = (tuple(A[i, j] for i in range(3)) for j in range(3))
-    square = _pairs.rounded(_pairs.dot(a3, a3))
-    ex, ey = (_pairs.rounded(_pairs.dot(a, a3)) / square for a in (a1, a2))
-    # The parts of a1 and a2 perpendicular to a3 have the lengths |a1 x a3| / |a3| and so on.
-    n1, n2 = (tuple(map(_pairs.rounded, _pairs.cross(a, a3))) for a in (a1, a2))
+    square, ex, ey, n1, n2 = _beside_the_pole(A)
     n1_length, det = length(*n1), determinant(A)
     c10 = _pairs.rounded(_pairs.dot(n1, n2)) / (n1_length * square)
     c11 = jnp.abs(det) / (n1_length * jnp.sqrt(square))
     return Canonical(n1_length / square, c10, c11, ex, ey), n1, det
 
 
-@canonical_terms.defjvp
+@_canonical_terms.defjvp
 def _canonical_terms_jvp(primals, tangents):
     r"""With $A = \|A n\|\,Q M$, Q orthogonal and M canonical: what $Q^T dA/\|A n\|$ is beyond a turn and a scale of M."""
     (A,), (dA,) = primals, tangents
@@ -139,6 +167,18 @@ def canonical(A: Mat3) -> Mat3:
     return jnp.stack([jnp.stack([c00, c10, zero]), jnp.stack([zero, c11, zero]), jnp.stack([ex, ey, one])])
 
 
+@jax.custom_jvp
+def _conditional(a, b, c, d):
+    """`d - b c / a`, from the determinant; by `a`, the derivative of that quotient would cancel."""
+    return stable.dot((a, -b), (d, c)) / a
+
+
+@_conditional.defjvp
+def _conditional_jvp(primals, tangents):
+    (a, b, c, _), (da, db, dc, dd) = primals, tangents
+    return _conditional(*primals), dd + (b / a) * (c / a) * da - (c / a) * db - (b / a) * dc
+
+
 @stable.widened
 def from_slopes(mean: Vec2, scatter: Mat2) -> Mat3:
     r"""The canonical `A` whose slope density is the Student-t density at `mean` with shape `scatter`/2.
@@ -148,8 +188,7 @@ def from_slopes(mean: Vec2, scatter: Mat2) -> Mat3:
     """
     c00 = jnp.sqrt(scatter[0, 0])
     c10 = scatter[1, 0] / c00
-    determinant = scatter[0, 0] * scatter[1, 1] - scatter[1, 0] * scatter[0, 1]
-    c11 = jnp.sqrt(determinant / scatter[0, 0])
+    c11 = jnp.sqrt(_conditional(scatter[0, 0], scatter[0, 1], scatter[1, 0], scatter[1, 1]))
     zero, one = jnp.zeros_like(c00), jnp.ones_like(c00)
     return jnp.stack([jnp.stack([c00, c10, zero]), jnp.stack([zero, c11, zero]), jnp.stack([-mean[0], -mean[1], one])])
 
@@ -157,9 +196,10 @@ def from_slopes(mean: Vec2, scatter: Mat2) -> Mat3:
 @stable.widened
 def to_slopes(A: Mat3) -> tuple[Vec2, Mat2]:
     """The `(mean, scatter)` of `from_slopes` for any `A`: (2,) and (2, 2)."""
-    (c00, c10, _), (_, c11, _), (ex, ey, _) = canonical(A)
-    off = c00 * c10
-    return -jnp.stack([ex, ey]), jnp.stack([jnp.stack([c00 * c00, off]), jnp.stack([off, c10 * c10 + c11 * c11])])
+    square, ex, ey, n1, n2 = _beside_the_pole(near_one(A)[0])
+    # Not by C, whose parts turn with the ellipse where it is nearly a line.
+    xx, xy, yy = (_pairs.rounded(_pairs.dot(a, b)) / square / square for a, b in ((n1, n1), (n1, n2), (n2, n2)))
+    return -jnp.stack([ex, ey]), jnp.stack([jnp.stack([xx, xy]), jnp.stack([xy, yy])])
 
 
 def sggx(A: Mat3) -> Mat3:
@@ -171,17 +211,8 @@ def sggx(A: Mat3) -> Mat3:
 @stable.widened
 def size(A: Mat3) -> Scalar:
     r"""The $C_e$ that gives unit projected area along n: $\sqrt{|\det A| / (\pi \|A n\|)}$. walter2014 (29)."""
-    return jnp.sqrt(jnp.abs(determinant(A)) / (math.pi * length(*A[:, 2])))
-
-
-def reciprocal_scale(x: Scalar) -> Scalar:
-    """A power of two near 1/|x|: a factor that rounds nothing."""
-    integer = jnp.int32 if x.dtype == jnp.float32 else jnp.int64
-    one, infinity = (lax.bitcast_convert_type(jnp.asarray(c, x.dtype), integer) for c in (1, jnp.inf))
-    # By its exponent's bits: a division, which XLA computes once for all its uses, would cut the expression in pieces.
-    scale = 2 * one - (lax.bitcast_convert_type(x, integer) & infinity)
-    least = lax.bitcast_convert_type(jnp.asarray(jnp.finfo(x.dtype).tiny, x.dtype), integer)
-    return lax.stop_gradient(lax.bitcast_convert_type(jnp.maximum(scale, least), x.dtype))
+    A, scale = near_one(A)
+    return jnp.sqrt(jnp.abs(determinant(A)) / (math.pi * length(*A[:, 2]))) / scale
 
 
 def inverse_square(wm: Vec3, A: Mat3) -> tuple[Scalar, Scalar]:
@@ -238,8 +269,9 @@ def gaussian_curvature(wm: Vec3, A: Mat3, size: Real) -> Scalar:
 
     walter2014 (20).
     """
+    A, scale = near_one(A)
     q, det = inverse_square(wm, A)
-    return (det * q / size) ** 2
+    return (det * q / (size * scale)) ** 2
 
 
 @stable.widened
@@ -250,7 +282,8 @@ def projected_area(w: Vec3, A: Mat3, size: Real) -> Scalar:
 
     walter2014 (26).
     """
-    return math.pi * size**2 * length(*times_exactly(A, w)) / jnp.abs(determinant(A))
+    A, scale = near_one(A)
+    return math.pi * (size * scale) ** 2 * length(*times_exactly(A, w)) / jnp.abs(determinant(A))
 
 
 @jax.custom_jvp
@@ -304,8 +337,9 @@ def lune_area(u: Vec3, v: Vec3, A: Mat3, size: Real) -> Scalar:
 
     walter2014 (28).
     """
+    A, scale = near_one(A)
     _, ratio = _lune_sum(_pairs.times(A, tuple(u)), _pairs.times(A, tuple(v)))
-    return math.pi * size**2 * ratio / (2 * jnp.abs(determinant(A)))
+    return math.pi * (size * scale) ** 2 * ratio / (2 * jnp.abs(determinant(A)))
 
 
 def mean_normal(A: Mat3) -> Vec3:
@@ -313,6 +347,7 @@ def mean_normal(A: Mat3) -> Vec3:
 
     It is not n where the ellipsoid is skewed. walter2014 §5.1.
     """
+    A, _ = near_one(A)
     return jnp.stack(stable.unit(*times(A.T, *A[:, 2])))
 
 
@@ -322,6 +357,7 @@ def sigma(w: Vec3, A: Mat3) -> Scalar:
 
     walter2014 (26), (28).
     """
+    A, _ = near_one(A)
     x, y, z = A[:, 2]
     zero = jnp.zeros_like(z)
     total, _ = _lune_sum(_pairs.times(A, tuple(w)), ((x, zero), (y, zero), (z, zero)))

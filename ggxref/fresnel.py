@@ -4,7 +4,9 @@
 indices alone.
 """
 
+import jax
 import jax.numpy as jnp
+from jax import lax
 
 from ggxref import stable
 from ggxref._types import Real, Scalar
@@ -18,17 +20,45 @@ def dielectric(cos_i: Real, eta: Real) -> Scalar:
 
     Fresnel's equations (Walter et al. 2007 (22)), used by heitz2014 §2.1 and walter2014 §1.1.
     """
-    c = jnp.abs(jnp.asarray(cos_i))
+    return _dielectric(jnp.asarray(cos_i), jnp.asarray(eta))
+
+
+@jax.custom_jvp
+def _dielectric(cosine, eta):
+    _, _, _, fine, r_s, r_p = _amplitudes(jnp.abs(cosine), eta)
+    return jnp.where(fine, (r_s * r_s + r_p * r_p) / 2, jnp.where(eta > 1, 1, 0))
+
+
+def _amplitudes(c, eta):
+    """c_t, the denominators of R_s and R_p, whether light is split at all, R_s and R_p."""
     gap = (1 - eta) * (1 + eta)  # 1 - eta², exact also near eta = 1
     square = gap + (eta * c) ** 2
-    total = square <= 0
     ct = stable.sqrt(square)
     # Both numerators times their conjugates: ηc − c_t and c − ηc_t cancel as η → 1, these do not.
     s_sum, p_sum = eta * c + ct, c + eta * ct
-    fine = (s_sum > 0) & ~total & (gap != 0)
-    r_s = gap / jnp.where(fine, s_sum, 1) ** 2
-    r_p = gap * (c * c - eta**2 * (1 - c) * (1 + c)) / jnp.where(fine, p_sum, 1) ** 2
-    return jnp.where(total & (gap < 0), 1, jnp.where(fine, (r_s * r_s + r_p * r_p) / 2, 0))
+    fine = (s_sum > 0) & (square > 0) & (gap != 0)
+    s_sum, p_sum = jnp.where(fine, s_sum, 1), jnp.where(fine, p_sum, 1)
+    r_s = -gap / s_sum**2
+    r_p = gap * (c * c - eta**2 * (1 - c) * (1 + c)) / p_sum**2
+    return jnp.where(fine, ct, 1), s_sum, p_sum, fine, r_s, r_p
+
+
+@_dielectric.defjvp
+def _dielectric_jvp(primals, tangents):
+    """Of R = (a − b)/(a + b), 2 (b da − a db)/(a + b)²: the difference is simple, its terms are large where c is small.
+
+    By c, those of R_s and R_p add up to a multiple of sin²: what they differ by, V⁴ − (1 − (1 + η²) sin²) U⁴, is expanded about U.
+    """
+    (cosine, eta), (dc, deta) = primals, tangents
+    c = jnp.abs(cosine)
+    ct, u, v, fine, r_s, r_p = _amplitudes(c, eta)
+    gap, sin_square = (1 - eta) * (1 + eta), (1 - c) * (1 + c)
+    by_eta = 2 * c / ct * (r_s / u**2 - r_p / v**2 * (1 - 2 * eta**2 * sin_square))
+    d = (eta - 1) * gap / (c + ct)  # V − U = d sin²
+    e = d * (2 * u + sin_square * d)  # V² − U² = e sin²
+    sum_over = (1 + eta**2) * u**4 + e * (2 * u * u + sin_square * e)
+    by_c = -2 * eta * gap * gap * sin_square / ct * (sum_over / (u * v) ** 4)
+    return _dielectric(*primals), jnp.where(fine, by_c * jnp.sign(cosine), 0) * dc + jnp.where(fine, by_eta, 0) * deta
 
 
 def conductor(cos_i: Real, eta: Real, k: Real) -> Scalar:
@@ -40,7 +70,12 @@ def conductor(cos_i: Real, eta: Real, k: Real) -> Scalar:
 
     Fresnel's equations for absorbing media, as in heitz2014 §2.1 and walter2014 §1.1 ("complex index of refraction").
     """
-    c = jnp.abs(jnp.asarray(cos_i))
+    return _conductor(jnp.asarray(cos_i), jnp.asarray(eta), jnp.asarray(k))
+
+
+@jax.custom_jvp
+def _conductor(cosine, eta, k):
+    c = jnp.abs(cosine)
     sin_square = (1 - c) * (1 + c)
     # (a + ib)² = (η + ik)² − sin²θ; the smaller of a, b comes from the product ab = ηk, as its difference cancels.
     gap = (eta - 1) * (eta + 1) - k * k
@@ -61,6 +96,42 @@ def conductor(cos_i: Real, eta: Real, k: Real) -> Scalar:
     return jnp.where(whole > 0, s_minus * (p_plus + p_minus) / (2 * jnp.where(whole > 0, whole, 1)), 0)
 
 
+@_conductor.defjvp
+def _conductor_jvp(primals, tangents):
+    by_c, by_eta, by_k = _conductor_slopes(*primals)
+    return _conductor(*primals), by_c * tangents[0] + by_eta * tangents[1] + by_k * tangents[2]
+
+
+@stable.widened
+def _conductor_slopes(cosine, eta, k):
+    r"""By the complex amplitudes, with $N = \eta + ik$, $t^2 = N^2 - \sin^2\theta$ and $G = N^2 - 1$:
+    $r_s = -G/(c+t)^2$, $r_p = G(N^2c^2 - \sin^2\theta)/(N^2c + t)^2$; as in `dielectric`, of either the difference is simple.
+    """
+    c = jnp.abs(cosine)
+    sin_square = (1 - c) * (1 + c)
+    N = lax.complex(*jnp.broadcast_arrays(eta, k))
+    G = lax.complex((eta - 1) * (eta + 1) - k * k, 2 * eta * k)
+    t = jnp.sqrt(G + c * c)
+    critical = t == 0  # the derivative is infinite
+    t = jnp.where(critical, 1, t)
+    u, v = c + t, N * N * c + t
+    r_s, r_p = -G / (u * u), G * (N * N * (c * c) - sin_square) / (v * v)
+    by_N = 2 * (jnp.conj(r_p) / (v * v) * (N * N - 2 * sin_square) - jnp.conj(r_s) / (u * u)) * N * c / t
+    # Here V = N²c + t and N U, U = c + t, differ by d U sin², and |V|² and |N U|² by e |U|² sin².
+    d = (1 - N) * (G / u) / (N * c + t)
+    n_square, e = _square(N), 2 * jnp.real(N * jnp.conj(d)) + sin_square * _square(d)
+    sum_over = n_square * n_square + N * N + e * (2 * n_square + sin_square * e)
+    by_c = -2 * sin_square * _square(G / v / v) * jnp.real(sum_over / t)
+    slopes = by_c * jnp.sign(cosine), jnp.real(by_N), -jnp.imag(by_N)
+    by_c, by_eta, by_k = (jnp.where(critical, 0, x) for x in slopes)
+    return by_c, by_eta, by_k
+
+
+def _square(x):
+    """|x|² of a complex number."""
+    return jnp.real(x) ** 2 + jnp.imag(x) ** 2
+
+
 def schlick(cos_i: Real, f0: Real) -> Scalar:
     r"""Schlick's approximation: $F = F_0 + (1 - F_0)(1 - |c|)^5$.
 
@@ -68,4 +139,17 @@ def schlick(cos_i: Real, f0: Real) -> Scalar:
 
     Schlick 1994.
     """
-    return f0 + (1 - f0) * (1 - jnp.abs(jnp.asarray(cos_i))) ** 5
+    return _schlick(jnp.asarray(cos_i), jnp.asarray(f0))
+
+
+@jax.custom_jvp
+def _schlick(c, f0):
+    return f0 + (1 - f0) * (1 - jnp.abs(c)) ** 5
+
+
+@_schlick.defjvp
+def _schlick_jvp(primals, tangents):
+    (cosine, f0), (dc, df) = primals, tangents
+    c = jnp.abs(cosine)
+    rest = c * (5 + c * (-10 + c * (10 + c * (c - 5))))  # 1 - (1 - c)^5, which cancels at c = 0
+    return _schlick(*primals), rest * df - 5 * (1 - f0) * (1 - c) ** 4 * jnp.sign(cosine) * dc

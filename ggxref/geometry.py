@@ -1,5 +1,6 @@
 """Directions: reflection, refraction, half vectors, frames."""
 
+import jax
 import jax.numpy as jnp
 
 from ggxref import stable
@@ -55,9 +56,29 @@ def half_refraction(wi: Vec3, wo: Vec3, n_i: Real, n_o: Real) -> Vec3:
 
     Walter et al. 2007 (16), used by heitz2014 §2.1.
     """
+    return _between(wi, wo, jnp.asarray(n_i, wi.dtype), jnp.asarray(n_o, wi.dtype))
+
+
+def _weighted(wi, wo, n_i, n_o):
     x, y, z = stable.weighted_sum(wi, wo, n_i, n_o)
     side = jnp.where(z < 0, -1, 1).astype(z.dtype)
     return stable.direction(side * x, side * y, side * z)
+
+
+_between = jax.custom_jvp(_weighted)
+
+
+@_between.defjvp
+def _between_jvp(primals, tangents):
+    r"""By the indices $(n_i dn_o - n_o dn_i)\,\omega_h\times(\omega_o\times\omega_i)/\|n_i\omega_i + n_o\omega_o\|^2$: where all
+    three are nearly parallel, nothing else is left of it.
+    """
+    (wi, wo, n_i, n_o), (di, do, dn_i, dn_o) = primals, tangents
+    wm, turned = jax.jvp(lambda wi, wo: _weighted(wi, wo, n_i, n_o), (wi, wo), (di, do))
+    x, y, z = stable.weighted_sum(wi, wo, n_i, n_o)
+    square = x * x + y * y + z * z
+    across = jnp.cross(wm, stable.cross(wo, wi)) / jnp.where(square > 0, square, 1)
+    return wm, turned + across * (n_i * dn_o - n_o * dn_i)
 
 
 def basis(w: Vec3) -> Mat3:

@@ -1,10 +1,11 @@
 """Changes of variable: the solid angle that a map makes of a unit of solid angle, or of slope area."""
 
+import jax
 import jax.numpy as jnp
 
 from ggxref import stable
 from ggxref._types import Mat3, Real, Scalar, Vec3
-from ggxref.ellipsoid import determinant, length, times_exactly
+from ggxref.ellipsoid import determinant, length, near_one, times_exactly
 
 
 def reflection(wo: Vec3, wm: Vec3) -> Scalar:
@@ -24,12 +25,27 @@ def refraction(wi: Vec3, wo: Vec3, wm: Vec3, n_i: Real, n_o: Real) -> Scalar:
 
     heitz2014 §2.2 (printed as ∂ω_ht/∂ω_i; the variable is the generated direction ω_o).
     """
-    i, o = stable.cosine(wi, wm), stable.cosine(wo, wm)
+    return _spread(stable.cosine(wi, wm), stable.cosine(wo, wm), jnp.asarray(n_i, wi.dtype), jnp.asarray(n_o, wi.dtype))
+
+
+@jax.custom_jvp
+def _spread(i, o, n_i, n_o):
     # A plain sum may be contracted to an FMA, which is not 0 where the two terms are opposite.
-    n = jnp.asarray(n_i, wi.dtype), jnp.asarray(n_o, wi.dtype)
-    path = stable.dot(n, (i, o))
+    path = stable.dot((n_i, n_o), (i, o))
     straight = path == 0
     return jnp.where(straight, jnp.inf, n_o**2 * jnp.abs(o) / jnp.where(straight, 1, path) ** 2)
+
+
+@_spread.defjvp
+def _spread_jvp(primals, tangents):
+    """By n_o and o the terms of the quotient rule cancel, wherever n_i ω_i·ω_m is small beside n_o ω_o·ω_m."""
+    (i, o, n_i, n_o), (di, do, dn_i, dn_o) = primals, tangents
+    path, value = stable.dot((n_i, n_o), (i, o)), _spread(*primals)
+    path = jnp.where(path == 0, 1, path)
+    weight = n_o / path * (n_o / path)  # |o| in place of a division by o
+    along = weight * jnp.sign(o) * ((n_i * i - n_o * o) / path)
+    rest = 2 * weight * jnp.abs(o) * ((n_i * i / n_o * dn_o - i * dn_i - n_i * di) / path)
+    return value, jnp.where(jnp.isinf(value), 0, along * do + rest)
 
 
 def slope(wm: Vec3) -> Scalar:
@@ -50,5 +66,6 @@ def linear(wm: Vec3, M: Mat3) -> Scalar:
 
     dupuy2023 (1), tokuyoshi2024 (18).
     """
+    M, _ = near_one(M)
     image = length(*times_exactly(M, wm))
     return jnp.abs(determinant(M)) / (image * image * image)

@@ -6,12 +6,14 @@ $\Lambda(\omega) = \Lambda(-\omega)$ and $G_1(\omega, \omega_m) = G_1(-\omega, \
 other side (walter2014 (7)), as transmission needs. All directions are unit, (3,); `alpha` is positive, (2,).
 """
 
+import jax
 import jax.numpy as jnp
 
 from ggxref import stable
+from ggxref._seen import over_beckmann, over_ggx
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import sigma as sigma_ellipsoid
-from ggxref.slopes import gaussian_tail, sigma_beckmann, sigma_ggx
+from ggxref.slopes import gaussian_tail, sigma_beckmann
 
 
 @stable.widened
@@ -43,21 +45,27 @@ def _up(w):
     return jnp.where(w[2] < 0, -w, w)
 
 
+def _n(z):
+    """The macronormal: G1 = z/σ is the share that it would have among the visible normals."""
+    return jnp.zeros_like(z), jnp.zeros_like(z), jnp.ones_like(z)
+
+
 @stable.widened
 def g1_ggx(w: Vec3, wm: Vec3, alpha: Vec2) -> Scalar:
     r"""Smith's G1 for GGX: $2|z|/(|z| + \|(\alpha_x x, \alpha_y y, z)\|)$ on front faces, else 0.
 
     dupuy2023 (15)–(17); tokuyoshi2024 as 1/(1 + Λ).
     """
-    return jnp.where(_front(w, wm), jnp.abs(w[2]) / sigma_ggx(_up(w), alpha), 0)
+    x, y, z = _up(w)
+    return jnp.where(_front(w, wm), 2 * over_ggx((x, y, z), _n(z), tuple(alpha), 1.0, z), 0)
 
 
 @stable.widened
 def g1_beckmann(w: Vec3, wm: Vec3, alpha: Vec2) -> Scalar:
     r"""Smith's G1 for Beckmann: $1/(1 + \Lambda(\omega))$ on front faces, else 0. heitz2014 §2.1 (Smith 1967)."""
-    sigma = sigma_beckmann(_up(w), alpha)
-    # σ > 0 wherever the face is seen; the inner `where` serves the gradient at w = 0.
-    return jnp.where(_front(w, wm), jnp.abs(w[2]) / jnp.where(sigma > 0, sigma, 1), 0)
+    up = _up(w)
+    g1 = over_beckmann(tuple(up), _n(up[2]), tuple(alpha), sigma_beckmann(up, alpha), up[2])
+    return jnp.where(_front(w, wm), g1, 0)
 
 
 @stable.widened
@@ -97,13 +105,27 @@ def g2_separable(g1_i: Real, g1_o: Real) -> Scalar:
     return jnp.asarray(g1_i) * g1_o
 
 
+@jax.custom_jvp
+def _correlated(g1_i, g1_o):
+    denominator = g1_i + g1_o * (1 - g1_i)
+    return jnp.where(denominator > 0, g1_i * g1_o / jnp.where(denominator > 0, denominator, 1), 0)
+
+
+@_correlated.defjvp
+def _correlated_jvp(primals, tangents):
+    """The squares of the shares of the sum: the quotient rule's terms cancel where one G1 is small."""
+    (g1_i, g1_o), (di, do) = primals, tangents
+    denominator = g1_i + g1_o * (1 - g1_i)
+    denominator = jnp.where(denominator > 0, denominator, jnp.inf)
+    return _correlated(*primals), (g1_o / denominator) ** 2 * di + (g1_i / denominator) ** 2 * do
+
+
 def g2_height_correlated(g1_i: Real, g1_o: Real) -> Scalar:
     r"""Smith's G2 with correlated heights: $G_iG_o/(G_i + G_o - G_iG_o)$, for reflection; 0 where both are 0.
 
     dupuy2023 (13).
     """
-    denominator = g1_i + g1_o * (1 - g1_i)
-    return jnp.where(denominator > 0, g1_i * g1_o / jnp.where(denominator > 0, denominator, 1), 0)
+    return _correlated(jnp.asarray(g1_i), jnp.asarray(g1_o))
 
 
 def g2_v_cavity(wi: Vec3, wo: Vec3, wm: Vec3) -> Scalar:

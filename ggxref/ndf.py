@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from ggxref import _pairs, stable
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
-from ggxref.ellipsoid import inverse_square
+from ggxref.ellipsoid import inverse_square, near_one
 
 
 def hemisphere(wm: Vec3) -> Scalar:
@@ -30,7 +30,7 @@ def ggx(wm: Vec3, alpha: Vec2) -> Scalar:
     """
     # A sum of squares: cos²(α² − 1) + 1, its equal on unit vectors, has lost every digit at α = 1e-4.
     q = stable.stretched_square(wm, alpha)
-    D = 1 / (math.pi * (alpha[0] * q) * (alpha[1] * q))
+    D = stable.lobe(alpha[0], alpha[1], q)
     return jnp.where(wm[2] > 0, D, 0)
 
 
@@ -88,11 +88,12 @@ def ellipsoid(wm: Vec3, A: Mat3) -> Scalar:
 
     walter2014 (1).
     """
+    A, _ = near_one(A)
     return ellipsoid_of(wm, A, *inverse_square(wm, A))
 
 
 def ellipsoid_of(wm: Vec3, A: Mat3, q: Scalar, det: Scalar) -> Scalar:
     """`ellipsoid` from what `inverse_square(wm, A)` gave."""
     An = jnp.sqrt(stable.dot(A[:, 2], A[:, 2]))
-    D = 1 / (math.pi * (det * q) * (An * q))
+    D = stable.lobe(det, An, q)
     return jnp.where(wm[2] > 0, D, 0)

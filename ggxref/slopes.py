@@ -7,9 +7,11 @@ projected area of the faces turned to ω, per unit of macrosurface: the normalis
 
 import math
 
+import jax
 import jax.numpy as jnp
 
 from ggxref import _pairs, stable
+from ggxref._seen import over_beckmann, over_ggx
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import canonical
 
@@ -41,8 +43,27 @@ def _stretched_square(slope, alpha):
 @stable.widened
 def ggx(slope: Vec2, alpha: Vec2) -> Scalar:
     r"""$P^{22} = 1 / (\pi\alpha_x\alpha_y (1 + \tilde x^2/\alpha_x^2 + \tilde y^2/\alpha_y^2)^2)$. heitz2014 §5."""
-    q = 1 + _stretched_square(slope, alpha)
-    return 1 / (math.pi * (alpha[0] * q) * (alpha[1] * q))
+    return _bell(slope[0], slope[1], alpha[0], alpha[1], jnp.zeros_like(slope[0]))
+
+
+@jax.custom_jvp
+def _bell(x, y, a, b, c):
+    r"""$1/(\pi a b (1 + u^2 + v^2)^2)$ with $u = x/a$, $v = (y - c u)/b$. Its derivatives do not underflow before it does."""
+    u = x / a
+    v = (y - c * u) / b
+    return stable.lobe(a, b, 1 + u * u + v * v)
+
+
+@_bell.defjvp
+def _bell_jvp(primals, tangents):
+    (x, y, a, b, c), (dx, dy, da, db, dc) = primals, tangents
+    u = x / a
+    v = (y - c * u) / b
+    D, q = _bell(*primals), 1 + u * u + v * v
+    by_v = 4 * v / q
+    by_u = 4 * u / q - by_v * (c / b)
+    across = (D * (by_v * v - 1) / b) * db - (D * by_v / b) * dy + (D * (by_v * u) / b) * dc
+    return D, across + (D * (by_u * u - 1) / a) * da - (D * by_u / a) * dx
 
 
 @stable.widened
@@ -73,11 +94,7 @@ def ellipsoid(slope: Vec2, A: Mat3) -> Scalar:
     The bivariate Student-t density with 2 degrees of freedom, location $-e$ and shape Σ/2 (design: canonical form).
     """
     (c00, c10, _), (_, c11, _), (ex, ey, _) = canonical(A)
-    x, y = slope[0] + ex, slope[1] + ey
-    u = x / c00
-    v = (y - c10 * u) / c11
-    q = 1 + u * u + v * v
-    return 1 / (math.pi * (c00 * q) * (c11 * q))
+    return _bell(slope[0] + ex, slope[1] + ey, c00, c11, c10)
 
 
 @stable.widened
@@ -112,11 +129,10 @@ def sigma_beckmann(w: Vec3, alpha: Vec2) -> Scalar:
     return jnp.maximum(w[2], 0) + s * tail / 2
 
 
-def _visible(slope, wi, sigma):
-    """Projection factor over its mean; heitz2014 (7) with the signs of its appendix A, as (7) itself has them wrong."""
-    ones = jnp.ones_like(slope[0])
-    factor = stable.dot(wi, jnp.stack([-slope[0], -slope[1], ones]))
-    return jnp.where((factor > 0) & (sigma > 0), factor / jnp.where(sigma > 0, sigma, 1), 0)
+def _factor(slope, wi):
+    """The normal of that slope, not unit, and its cosine; heitz2014 (7) with the signs of its appendix A, as (7) has them wrong."""
+    m = -slope[0], -slope[1], jnp.ones_like(slope[0])
+    return m, stable.dot(wi, jnp.stack(m))
 
 
 @stable.widened
@@ -127,10 +143,14 @@ def visible_ggx(slope: Vec2, wi: Vec3, alpha: Vec2) -> Scalar:
 
     heitz2014 (7).
     """
-    return _visible(slope, wi, sigma_ggx(wi, alpha)) * ggx(slope, alpha)
+    m, factor = _factor(slope, wi)
+    share = 2 * over_ggx(tuple(wi), m, tuple(alpha), 1.0, factor)
+    return jnp.where(factor > 0, share, 0) * ggx(slope, alpha)
 
 
 @stable.widened
 def visible_beckmann(slope: Vec2, wi: Vec3, alpha: Vec2) -> Scalar:
     """`visible_ggx` for Beckmann slopes. heitz2014 (7)."""
-    return _visible(slope, wi, sigma_beckmann(wi, alpha)) * beckmann(slope, alpha)
+    m, factor = _factor(slope, wi)
+    share = over_beckmann(tuple(wi), m, tuple(alpha), sigma_beckmann(wi, alpha), factor)
+    return jnp.where(factor > 0, share, 0) * beckmann(slope, alpha)

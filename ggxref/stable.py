@@ -83,6 +83,29 @@ def cosine(w: Vec3, wm: Vec3) -> Scalar:
     return _dot(w, wm, 3)
 
 
+@jax.custom_jvp
+def over_heights(a: tuple[Scalar, ...], b: tuple[Scalar, ...], cosine: Scalar) -> Scalar:
+    """`a · b / (a_z b_z)`, 1 + the product of the tangents; 0 where a height is. Its derivative is the product's alone.
+
+    `cosine` is `a · b`, in as many digits as it needs.
+    """
+    return cosine * _inverse_heights(a, b)
+
+
+def _inverse_heights(a, b):
+    z = a[2] * b[2]
+    return jnp.where(z == 0, 0, 1 / jnp.where(z == 0, 1, z))
+
+
+@over_heights.defjvp
+def _over_heights_jvp(primals, tangents):
+    (a, b, _), (da, db, _) = primals, tangents
+    inverse = _inverse_heights(a, b)
+    product = (a[0] * b[0] + a[1] * b[1]) * inverse
+    change = (a[0] * db[0] + b[0] * da[0] + a[1] * db[1] + b[1] * da[1]) * inverse
+    return over_heights(*primals), change - product * (da[2] * b[2] + a[2] * db[2]) * inverse
+
+
 def cross(a: Vec3, b: Vec3) -> Vec3:
     """$a \\times b$, each component as exact as `dot`: the plain ones cancel where a and b are nearly parallel."""
     # Component i takes the components i + 1 and i + 2, around the corner.
@@ -185,6 +208,30 @@ def log1p(x: Scalar) -> Scalar:
 
 
 @jax.custom_jvp
+def lobe(a: Scalar, b: Scalar, q: Scalar) -> Scalar:
+    r"""$1/(\pi a b q^2)$, the shape of every GGX: each product within the range, and in the derivative each quotient."""
+    return 1 / (math.pi * (a * q) * (b * q))
+
+
+@lobe.defjvp
+def _lobe_jvp(primals, tangents):
+    value = lobe(*primals)
+    da, db, dq = (dx / x for x, dx in zip(primals, tangents, strict=True))
+    return value, -value * (da + db + 2 * dq)
+
+
+@jax.custom_jvp
+def one_minus_square(x: Scalar) -> Scalar:
+    """`1 - x²`, exact near 1, with the derivative -2x: that of the product cancels near 0."""
+    return (1 - x) * (1 + x)
+
+
+@one_minus_square.defjvp
+def _one_minus_square_jvp(primals, tangents):
+    return one_minus_square(*primals), -2 * primals[0] * tangents[0]
+
+
+@jax.custom_jvp
 def sqrt(x: Real) -> Scalar:
     """Square root with derivative 0, not infinity, at `x <= 0`; 0 for negative `x`, which only rounding may make."""
     return jnp.sqrt(jnp.maximum(x, 0))
@@ -224,11 +271,37 @@ def _rsqrt_jvp(primals, tangents):
     return root, -0.5 * root / x * dx
 
 
+@jax.custom_jvp
+def turning(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """The vector as it is, for what depends on its direction alone: as if its length were a constant.
+
+    A change along the vector cancels later on, but for its rounding, next to which what turns a smooth surface's normals is
+    small. Here it is left out before.
+    """
+    return x, y, z
+
+
+@turning.defjvp
+def _turning_jvp(primals, tangents):
+    (x, y, z), (dx, dy, dz) = primals, tangents
+    square = x * x + y * y + z * z
+    length = jnp.sqrt(jnp.where(square > 0, square, 1))
+    p, q, r = x / length, y / length, z / length
+    held = lax.stop_gradient(length) / length  # 1, for second derivatives
+    turned = (
+        held * ((q * q + r * r) * dx - p * (q * dy + r * dz)),
+        held * ((p * p + r * r) * dy - q * (p * dx + r * dz)),
+        held * ((p * p + q * q) * dz - r * (p * dx + q * dy)),
+    )
+    return primals, turned
+
+
 @widened
 def unit(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     """The components divided by their length; the zero vector stays zero, with a zero gradient."""
+    x, y, z = turning(x, y, z)
     square = x * x + y * y + z * z
-    scale = rsqrt(jnp.where(square > 0, square, 1))
+    scale = lax.stop_gradient(rsqrt(jnp.where(square > 0, square, 1)))
     return x * scale, y * scale, z * scale
 
 
@@ -269,9 +342,24 @@ def either(condition: Bool[Array, ""], one: Vec3, other: Vec3) -> Vec3:
 @widened
 def azimuth(x: Scalar, y: Scalar, pole: tuple[Real, Real] = (1.0, 0.0)) -> tuple[Scalar, Scalar]:
     """Cosine and sine of the azimuth of `(x, y)`; `pole` at the origin, where there is none."""
+    (cosine, sine), square = _azimuth(x, y), x * x + y * y
+    return jnp.where(square > 0, cosine, pole[0]), jnp.where(square > 0, sine, pole[1])
+
+
+@jax.custom_jvp
+def _azimuth(x, y):
     square = x * x + y * y
     scale = 1 / jnp.sqrt(jnp.where(square > 0, square, 1))
-    return jnp.where(square > 0, x * scale, pole[0]), jnp.where(square > 0, y * scale, pole[1])
+    return x * scale, y * scale
+
+
+@_azimuth.defjvp
+def _azimuth_jvp(primals, tangents):
+    (x, y), (dx, dy) = primals, tangents
+    cosine, sine = _azimuth(x, y)
+    square = x * x + y * y
+    turn = (cosine * dy - sine * dx) / jnp.sqrt(jnp.where(square > 0, square, 1))
+    return (cosine, sine), (-sine * turn, cosine * turn)
 
 
 # Taylor coefficients of sin 2πv / v and cos 2πv in v²: on |v| <= 1/8 the first term left out is below half an ulp.
@@ -391,8 +479,9 @@ def _x_minus_sin(x):
 
 
 @jax.custom_jvp
-def kepler(v: Real) -> Scalar:
-    r"""The root E in [0, π] of $E - \sin E = 2\pi v$ for `v` in [0, 1/2]: Kepler's equation at eccentricity 1.
+def kepler(v: Real) -> tuple[Scalar, Scalar]:
+    r"""$(\cos\frac E2, \sin\frac E2)$ for the root E in [0, π] of $E - \sin E = 2\pi v$, `v` in [0, 1/2]: Kepler's equation at
+    eccentricity 1.
 
     E/2 is the angle that cuts the fraction `v` of a disk's area, so this inverts the marginal of a uniform disk.
     """
@@ -406,12 +495,15 @@ def kepler(v: Real) -> Scalar:
         slope = jnp.where(slope > 0, slope, 1)
         step = f / slope
         E = E - step / (1 - 0.5 * step * (jnp.sin(E) / slope))
-    return E
+    # Towards 1/2 the cosine has the digits of π − E, the root of x + sin x = π − 2πv: one step of Newton's.
+    x = math.pi - E
+    x = x - (x + jnp.sin(x) - (2 * math.pi) * (0.5 - v)) / (1 + jnp.cos(jnp.minimum(x, 2)))
+    far = v > 0.25
+    return jnp.where(far, jnp.sin(x / 2), jnp.cos(E / 2)), jnp.where(far, jnp.cos(x / 2), jnp.sin(E / 2))
 
 
 @kepler.defjvp
 def _kepler_jvp(primals, tangents):
-    (v,), (dv,) = primals, tangents
-    E = kepler(v)
-    slope = 2 * jnp.sin(E / 2) ** 2
-    return E, jnp.where(slope > 0, (2 * math.pi) / jnp.where(slope > 0, slope, 1), 0) * dv
+    c, s = kepler(*primals)
+    turn = jnp.where(s > 0, math.pi / 2 / jnp.where(s > 0, s, 1), 0)  # of E/2, times sin E/2
+    return (c, s), (-turn * tangents[0], turn * (c / jnp.where(s > 0, s, 1)) * tangents[0])

@@ -194,6 +194,7 @@ def proof(name: str, function: Callable, draws: tuple[str, ...], region: str, co
         for k in range(count):
             x = args[a][..., k]
             change = np.cross(x, rng.normal(size=3)) if draws[a] in DIRECTIONS else x * rng.uniform(-1, 1, x.shape)
+            change = np.asarray(change)
             if draws[a] == "scatter":
                 change = (change + change.T) / 2
             if argument != block:  # one number of the argument
@@ -202,6 +203,6 @@ def proof(name: str, function: Callable, draws: tuple[str, ...], region: str, co
             columns = jacobians[:, cut, k]
             along = np.ravel(change) if argument == block else change[int(block[-2])][None]
             size = np.linalg.norm(columns) * np.linalg.norm(along)
-            if np.isfinite(size) and size > 1e-200:
+            if np.isfinite(size) and size > FLOOR:
                 found.append(np.abs(columns @ along - quotient(name, inputs, argument, change)).max() / size)
     return np.array(found)

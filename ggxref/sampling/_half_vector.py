@@ -1,6 +1,7 @@
 """The half vector of a direction and a point of its cap, with its digits also where the two nearly cancel."""
 
 import jax.numpy as jnp
+from jax import lax
 
 from ggxref import stable
 from ggxref._types import Real, Scalar, Turn, Vec2
@@ -26,6 +27,11 @@ def half_in_cap(
     lengths of `i` and `c` and Δ the angle between them, $(r - \rho) + \rho\,(1 + \cos\Delta)$ and $\rho\sin\Delta$, where
     $r^2 - \rho^2 = h_z (h_z - 2z)$ and $1 + \cos\Delta = \sin^2\Delta/(1 - \cos\Delta)$.
     """
+    length = stable.sqrt(x * x + y * y + z * z)
+    cut = cut * (
+        lax.stop_gradient(length) / jnp.where(length > 0, length, 1)
+    )  # in units of the length, as that is held
+    x, y, z = stable.turning(x, y, z)
     flat = x * x + y * y
     r = stable.sqrt(flat)
     norm, rise, fall = rise_and_fall(x, y, z)

@@ -21,6 +21,7 @@ class Incident(NamedTuple):
 
 def ray(x: Scalar, y: Scalar, z: Scalar) -> Incident:
     """`incident` times a positive factor, ‖(x, y, z)‖ + |z|: a half vector needs no more, and no division is left."""
+    x, y, z = stable.turning(x, y, z)
     square = x * x + y * y
     norm = stable.sqrt(square + z * z)
     below = z < 0
@@ -33,6 +34,8 @@ def ray(x: Scalar, y: Scalar, z: Scalar) -> Incident:
 
 def incident(x: Scalar, y: Scalar, z: Scalar) -> Incident:
     """The sphere-space direction along `(x, y, z)`, which need not be unit."""
+    length = stable.sqrt(x * x + y * y + z * z)
+    x, y, z = stable.turning(x, y, z)
     square = x * x + y * y
     norm = stable.sqrt(square + z * z)
     norm = jnp.where(norm > 0, norm, 1)
@@ -41,7 +44,7 @@ def incident(x: Scalar, y: Scalar, z: Scalar) -> Incident:
     large = norm + jnp.abs(z)
     small = square / large
     rise, fall = jnp.where(below, small, large) / norm, jnp.where(below, large, small) / norm
-    return Incident(x / norm, y / norm, z / norm, norm, rise, fall)
+    return Incident(x / norm, y / norm, z / norm, length, rise, fall)
 
 
 def half_in_cap(u: Vec2, i: Incident, cut: Real, turn: Turn = stable.cos_sin_turn) -> tuple[Scalar, Scalar, Scalar]:

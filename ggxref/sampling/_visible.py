@@ -6,15 +6,9 @@ One density a normal distribution, whatever the sampler. heitz2014 (2), (5); dup
 import jax.numpy as jnp
 
 from ggxref import ndf, slopes, stable
+from ggxref._seen import over_beckmann, over_ggx
 from ggxref._types import Mat3, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import sigma as sigma_ellipsoid
-
-
-def _density(wm, wi, D, sigma):
-    cosine = stable.cosine(wi, wm)
-    seen = (cosine > 0) & (sigma >= jnp.finfo(sigma.dtype).tiny)
-    # The quotient first, which is finite: in the tails of Beckmann, cosine · D is 0 where the density is not.
-    return jnp.where(seen, D * (cosine / jnp.where(seen, sigma, 1)), 0)
 
 
 @stable.widened
@@ -27,7 +21,9 @@ def pdf_ggx(wm: Vec3, wi: Vec3, alpha: Vec2) -> Scalar:
 
     heitz2014 (2), (5); dupuy2023 (1), (2).
     """
-    return _density(wm, wi, ndf.ggx(wm, alpha), slopes.sigma_ggx(wi, alpha))
+    cosine = stable.cosine(wi, wm)
+    share = 2 * over_ggx(tuple(wi), tuple(wm), tuple(alpha), 1.0, cosine)
+    return jnp.where(cosine > 0, ndf.ggx(wm, alpha) * share, 0)
 
 
 @stable.widened
@@ -38,7 +34,10 @@ def pdf_beckmann(wm: Vec3, wi: Vec3, alpha: Vec2) -> Scalar:
 
     heitz2014 (2), (5).
     """
-    return _density(wm, wi, ndf.beckmann(wm, alpha), slopes.sigma_beckmann(wi, alpha))
+    cosine = stable.cosine(wi, wm)
+    share = over_beckmann(tuple(wi), tuple(wm), tuple(alpha), slopes.sigma_beckmann(wi, alpha), cosine)
+    # The share first, which is finite: in the tails cosine · D is 0 where the density is not.
+    return jnp.where(cosine > 0, ndf.beckmann(wm, alpha) * share, 0)
 
 
 @stable.widened
@@ -49,4 +48,6 @@ def pdf_ellipsoid(wm: Vec3, wi: Vec3, A: Mat3) -> Scalar:
 
     walter2014 (33).
     """
-    return _density(wm, wi, ndf.ellipsoid(wm, A), sigma_ellipsoid(wi, A))
+    cosine, sigma = stable.cosine(wi, wm), sigma_ellipsoid(wi, A)
+    seen = (cosine > 0) & (sigma >= jnp.finfo(sigma.dtype).tiny)
+    return jnp.where(seen, ndf.ellipsoid(wm, A) * (cosine / jnp.where(seen, sigma, 1)), 0)

@@ -2,7 +2,8 @@
 
 import jax.numpy as jnp
 
-from ggxref import ndf, slopes, stable
+from ggxref import ndf, stable
+from ggxref._seen import over_ggx
 from ggxref._types import Scalar, Turn, Vec2, Vec3
 from ggxref.ellipsoid import length
 from ggxref.sampling._sphere import half_in_cap, ray, unstretch
@@ -11,11 +12,11 @@ from ggxref.sampling._sphere import half_in_cap, ray, unstretch
 def _bound_terms(wi, alpha):
     """k and 1 − k, each without cancellation."""
     a = jnp.minimum(jnp.minimum(alpha[0], alpha[1]), 1)
-    s = 1 + length(wi[0], wi[1], 0)
-    denominator = s * s + (a * wi[2]) ** 2
+    w = wi[2] / (1 + length(wi[0], wi[1], 0))
+    denominator = 1 + (a * w) ** 2
     below = wi[2] <= 0  # said so that a NaN shows
-    k = jnp.where(below, 1, (1 - a) * (1 + a) * s * s / denominator)
-    return k, jnp.where(below, 0, a * a * (s * s + wi[2] ** 2) / denominator)
+    k = jnp.where(below, 1, stable.one_minus_square(a) / denominator)
+    return k, jnp.where(below, 0, a * a * (1 + w * w) / denominator)
 
 
 @stable.widened
@@ -55,10 +56,10 @@ def pdf(wm: Vec3, wi: Vec3, alpha: Vec2) -> Scalar:
     tokuyoshi2024.
     """
     cosine = stable.cosine(wi, wm)
-    cut = _bound_terms(wi, alpha)[1]
+    k, cut = _bound_terms(wi, alpha)
     # o'_z + i'_z = 2 (ωi·ωm) z_m / (norm q) has to reach (1 − k) z_i / norm.
     q = (wm[0] / alpha[0]) ** 2 + (wm[1] / alpha[1]) ** 2 + wm[2] ** 2
     slack = 1 - 16 * float(jnp.finfo(wm.dtype).eps)
     inside = (cosine > 0) & (2 * cosine * wm[2] >= slack * cut * wi[2] * q)
-    area = 2 * slopes.sigma_ggx(wi, alpha) - cut * wi[2]
-    return jnp.where(inside, 2 * ndf.ggx(wm, alpha) * cosine / jnp.where(inside, area, 1), 0)
+    share = over_ggx(tuple(wi), tuple(wm), tuple(alpha), k, cosine)
+    return jnp.where(inside, 2 * ndf.ggx(wm, alpha) * share, 0)

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from ggxref import ndf, stable
 from ggxref._types import Mat3, Scalar, Turn, Vec2, Vec3
-from ggxref.ellipsoid import Canonical, canonical_terms, inverse_square, length, normal_square
+from ggxref.ellipsoid import Canonical, canonical_terms, inverse_square, length, near_one, normal_square
 from ggxref.sampling._half_vector import rise_and_fall
 from ggxref.sampling.ellipsoid_cap import from_sphere, half_vector, to_sphere
 
@@ -76,6 +76,7 @@ def pdf(wm: Vec3, wi: Vec3, A: Mat3) -> Scalar:
 
     tokuyoshi2024's p_bound, for the ellipsoid.
     """
+    A, _ = near_one(A)
     terms = canonical_terms(A)
     _, rise, _ = rise_and_fall(*to_sphere(wi, terms))
     cosine, cut = stable.cosine(wi, wm), _cut(wi, terms)

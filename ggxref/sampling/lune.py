@@ -6,7 +6,7 @@ from jaxtyping import Array, Float, Int
 
 from ggxref import _pairs, stable
 from ggxref._types import Mat3, Scalar, Vec2, Vec3
-from ggxref.ellipsoid import cofactor, length, normal_square, times, times_exactly
+from ggxref.ellipsoid import cofactor, length, near_one, normal_square, times, times_exactly
 from ggxref.geometry import basis
 from ggxref.sampling._sphere import Incident, crescent
 from ggxref.sampling._visible import pdf_ellipsoid as pdf
@@ -59,6 +59,7 @@ def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:
 
     walter2014 (34)–(46), version 3. Where ω_i = n, (43) leaves e₂ free: it is the second row of `geometry.basis(e3)`.
     """
+    A, _ = near_one(A)
     along, across, rim = _concentric(u)
     (e1, e2, e3), pole, norm_n = _frame(wi, A)
     moved, lifted, height = stable.one_loop(*crescent(along, rim, pole, pole.x))
@@ -103,6 +104,7 @@ def sample_rejection_ellipsoid(u: Tries, wi: Vec3, A: Mat3) -> tuple[Vec3, Int[A
 
     walter2014 §4, version 2. Disk point: `r = sqrt(u[1])`, turned by `u[0]` in the frame `geometry.basis(A wi)`.
     """
+    A, _ = near_one(A)
     e3 = jnp.stack(stable.unit(*times(A, *wi)))
     t, b, _ = basis(e3)
 
@@ -123,6 +125,7 @@ def sample_rejection_sphere(u: Tries, wi: Vec3, A: Mat3) -> tuple[Vec3, Int[Arra
 
     walter2014 §4, version 1.
     """
+    A, _ = near_one(A)
     cof, det = cofactor(A)
     # The longest half axis: the largest singular value of A^{-T}, which has more digits than the smallest of A.
     radius = jnp.linalg.svd(cof / det, compute_uv=False)[0]

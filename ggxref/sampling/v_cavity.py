@@ -2,6 +2,7 @@
 
 from typing import Literal
 
+import jax
 import jax.numpy as jnp
 
 from ggxref import ndf, stable
@@ -12,11 +13,25 @@ _SAMPLE = {"ggx": normals.sample_ggx, "beckmann": normals.sample_beckmann}
 _NDF = {"ggx": ndf.ggx, "beckmann": ndf.beckmann}
 
 
+@jax.custom_jvp
 def _share(wm, wi):
     """Of the area that the two walls of the cavity show to `wi`, the share of the one with normal `wm`."""
-    a = jnp.maximum(stable.cosine(wi, wm), 0)
-    b = jnp.maximum(stable.cosine(wi, jnp.stack([-wm[0], -wm[1], wm[2]])), 0)
+    a, b = _shown(wm, wi)
     return a / jnp.where(a + b > 0, a + b, 1)
+
+
+def _shown(wm, wi):
+    other = jnp.stack([-wm[0], -wm[1], wm[2]])
+    return jnp.maximum(stable.cosine(wi, wm), 0), jnp.maximum(stable.cosine(wi, other), 0)
+
+
+@_share.defjvp
+def _share_jvp(primals, tangents):
+    """Where both are seen, the share is half of ω_i·ω_m/(z_i z_m); else it does not change."""
+    (wm, wi), (dm, di) = primals, tangents
+    a, b = _shown(wm, wi)
+    _, change = jax.jvp(lambda w, m: stable.over_heights(w, m, a), (tuple(wi), tuple(wm)), (tuple(di), tuple(dm)))
+    return _share(wm, wi), jnp.where((a > 0) & (b > 0), change / 2, 0)
 
 
 def sample(u: Vec3, wi: Vec3, alpha: Vec2, *, distribution: Literal["ggx", "beckmann"] = "ggx") -> Vec3:

@@ -1,0 +1,119 @@
+"""Derivatives in float32 keep their digits wherever the inputs' rounding leaves them; a form that loses them is caught."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from ggxref import bsdf, stable
+from ggxref.measure.accuracy import arguments
+from ggxref.measure.derivatives import measure, points, proof
+from ggxref.measure.regions import rounded
+from ggxref.measure.tables import DRAWS, library
+
+COUNT = 512
+LIMIT = 1e-4
+# Float64's own rounding against the oracle, at the condition of these regions: measured at most 4e-14.
+EXACT = 1e-12
+NAMES = [
+    "fresnel.schlick",
+    "masking.g1_ggx",
+    "masking.g2_height_correlated",
+    "sampling.spherical_cap.pdf",
+    "sampling.spherical_cap.sample",
+    "slopes.stretch",
+]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_well_conditioned_derivatives_keep_four_digits(name):
+    function = library(name)
+    for region in ("smooth", "perpendicular"):
+        found = measure(name, function, arguments(function), region, COUNT)
+        assert found.worst < LIMIT, found
+        assert found.not_finite == 0 and found.ill < COUNT / 2
+        assert proof(name, function, arguments(function), region, 4).max() < EXACT
+
+
+def plain_g1(w, wm, alpha):
+    stretched = jnp.sqrt((alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2 + w[2] ** 2)
+    return jnp.where(wm @ w > 0, 2 * w[2] / (w[2] + stretched), 0)
+
+
+def plain_stretch(w, factors):
+    v = jnp.stack([factors[0] * w[0], factors[1] * w[1], w[2]])
+    return v / jnp.sqrt(v @ v)
+
+
+@pytest.mark.parametrize(
+    ("name", "plain"), [("masking.g1_ggx", plain_g1), ("slopes.stretch", plain_stretch)], ids=["G1", "stretch"]
+)
+def test_a_derivative_that_cancels_is_caught(name, plain):
+    assert measure(name, plain, arguments(plain), "smooth", COUNT, library(name)).worst > 5 * LIMIT
+
+
+def test_a_lost_term_is_caught_by_the_oracle():
+    def frozen(w, wm, alpha):
+        return library("masking.g1_ggx")(w, wm, jax.lax.stop_gradient(alpha))
+
+    found = measure("masking.g1_ggx", frozen, ("w", "wm", "alpha"), "smooth", 64, library("masking.g1_ggx"))
+    assert found.worst > 0.9 and found.worst_block.startswith("alpha")
+
+
+def test_second_derivatives_of_a_direction():
+    """`unit` takes what lengthens the vector out of its first derivative, and must not out of the second."""
+
+    def plain(v):
+        return (v / jnp.sqrt(v @ v)) @ jnp.arange(1.0, 4.0)
+
+    with jax.enable_x64(True):
+        v = jnp.asarray([0.3, -0.2, 1.4])
+        found = jax.jit(jax.hessian(lambda v: jnp.stack(stable.unit(*v)) @ jnp.arange(1.0, 4.0)))(v)
+        np.testing.assert_allclose(found, jax.jit(jax.hessian(plain))(v), atol=1e-14)
+
+
+brdf_slopes = jax.jit(jax.grad(bsdf.brdf_ggx, argnums=(0, 1, 2)))
+
+
+@pytest.mark.parametrize("height", [1e-12, 1e-20, 1e-36])
+@pytest.mark.parametrize("y", [0.0, 0.3])
+def test_gradient_of_the_brdf_of_opposite_directions(height, y):
+    """Towards z = 0 it grows beyond float32's range, to whose end it is cut; NaN before."""
+    x = np.sqrt(1 - y * y)
+    wi, wo = (jnp.asarray([s * x, s * y, height], jnp.float32) for s in (1, -1))
+    slopes = brdf_slopes(wi, wo, jnp.asarray([0.5, 0.25], jnp.float32))
+    assert all(np.isfinite(s).all() for s in slopes)
+    if y == 0:  # 1/(4π αx² αy z)
+        value = 1 / (4 * np.pi * 0.5**2 * 0.25 * float(wi[2]))
+        np.testing.assert_allclose(slopes[2], [-4 * value, -4 * value], rtol=1e-5)
+
+
+# Function of a shape matrix -> the power of c that it is multiplied by for c A.
+HOMOGENEOUS = {
+    "ndf.ellipsoid": 0,
+    "masking.g1_ellipsoid": 0,
+    "ellipsoid.size": 1,
+    "ellipsoid.gaussian_curvature": 2,
+    "ellipsoid.lune_area": -2,
+    "jacobian.linear": 0,
+    "sampling.ellipsoid_bounded.sample": 0,
+    "sampling.ellipsoid_cap.sample": 0,
+    "sampling.lune.sample": 0,
+}
+
+
+@pytest.mark.parametrize("name", HOMOGENEOUS)
+def test_scale_of_the_shape_matrix_is_no_matter(name):
+    """To the bit: 2^±40 is 1e±12, for which products of minors leave float32's range."""
+    function = library(name)
+    draws = DRAWS.get(name, arguments(function))
+    drawn = rounded(points("skew", np.random.default_rng(3), 64), np.float32)
+    run = jax.jit(jax.vmap(function, in_axes=-1))
+
+    def at(power):
+        args = [drawn[d] * np.float32(2.0**power) if d in ("A", "M") else drawn[d] for d in draws]
+        return [np.asarray(x) for x in jax.tree.leaves(run(*args))]
+
+    for power in (-40, 40):
+        for found, expected in zip(at(power), at(0), strict=True):
+            np.testing.assert_array_equal(found, expected * 2.0 ** (power * HOMOGENEOUS[name]))
