@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from ggxref import _pairs, stable
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import inverse_square, near_one
+from ggxref.slopes import student
 
 
 def hemisphere(wm: Vec3) -> Scalar:
@@ -60,21 +61,8 @@ def student_t(wm: Vec3, alpha: Vec2, gamma: Real) -> Scalar:
 
     Ribardière et al. 2017.
     """
-    # With p = (γ−1)z² + ρ this is ((γ−1) z²/p)^(γ−2) ((γ−1)/p)² / (π αx αy): nothing is divided by z.
-    rho = _stretched(wm, alpha)
-    g = gamma - 1
     above = wm[2] > 0
-    z_square = jnp.where(above, wm[2], 1) ** 2
-    near = rho < g * z_square
-    # log1p keeps the lobe's digits; towards the horizon ρ/z² would overflow.
-    logarithm = jnp.where(
-        near,
-        -jnp.log1p(jnp.where(near, rho, 0) / (g * z_square)),
-        2 * jnp.log(jnp.where(above, wm[2], 1)) - jnp.log(z_square + rho / g),
-    )
-    q = z_square + rho / g
-    half = jnp.exp((gamma / 2 - 1) * logarithm)  # twice, as in `beckmann`
-    D = half * (half / (math.pi * (alpha[0] * q) * (alpha[1] * q)))
+    D = student(wm[0], wm[1], jnp.where(above, wm[2], 1), alpha[0], alpha[1], jnp.asarray(gamma, wm.dtype))
     return jnp.where(above, D, 0)
 
 

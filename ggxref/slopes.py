@@ -82,9 +82,47 @@ def student_t(slope: Vec2, alpha: Vec2, gamma: Real) -> Scalar:
 
     Ribardière et al. 2017.
     """
-    r = _stretched_square(slope, alpha)
-    half = jnp.exp(-gamma / 2 * jnp.log1p(r / (gamma - 1)))  # twice, as in `beckmann`
-    return half * (half / (math.pi * alpha[0] * alpha[1]))
+    one, gamma = jnp.ones_like(slope[0]), jnp.asarray(gamma, slope.dtype)
+    return student(slope[0], slope[1], one, alpha[0], alpha[1], gamma)
+
+
+@jax.custom_jvp
+def student(x: Scalar, y: Scalar, z: Scalar, ax: Scalar, ay: Scalar, gamma: Scalar) -> Scalar:
+    r"""$(\gamma-1)^\gamma / (\pi\alpha_x\alpha_y z^4 (\gamma-1+\rho/z^2)^\gamma)$, $\rho = x^2/\alpha_x^2 + y^2/\alpha_y^2$, `z > 0`."""
+    # With q = z² + ρ/(γ−1) this is (z²/q)^(γ−2) / (π αx αy q²): nothing is divided by z.
+    share, _, q = _student_parts(x, y, z, ax, ay, gamma)
+    half = jnp.exp((1 - gamma / 2) * share)  # twice, as in `beckmann`
+    return half * (half / (math.pi * (ax * q) * (ay * q)))
+
+
+def _student_parts(x, y, z, ax, ay, gamma):
+    """-log(z²/q), ρ/(γ−1) and q."""
+    rest, z_square = ((x / ax) ** 2 + (y / ay) ** 2) / (gamma - 1), z * z
+    near = rest < z_square
+    # log1p keeps the lobe's digits; towards the horizon ρ/z² would overflow.
+    logarithm = jnp.where(
+        near,
+        jnp.log1p(jnp.where(near, rest, 0) / jnp.where(near, z_square, 1)),
+        jnp.log(z_square + rest) - 2 * jnp.log(z),
+    )
+    return logarithm, rest, z_square + rest
+
+
+@student.defjvp
+def _student_jvp(primals, tangents):
+    """Each partial derivative as the value times a quotient, and what cancels by z and γ collected."""
+    (x, y, z, ax, ay, gamma), (dx, dy, dz, dax, day, dgamma) = primals, tangents
+    value, (logarithm, rest, q) = student(*primals), _student_parts(*primals)
+    g, share = gamma - 1, rest / q
+    # log(1/(1 − h)) − h, by its series where the terms cancel.
+    powers = sum(share**k / k for k in range(3, 18))
+    beyond = jnp.where(share < 0.1, share**2 / 2 + powers, logarithm - share)
+    change = value * (share / g - beyond) * dgamma + value * (2 * ((gamma - 2) * share - 2 * z * (z / q)) / z) * dz
+    for c, a, dc, da in ((x, ax, dx, dax), (y, ay, dy, day)):
+        p = c / a
+        slope = 2 * gamma * (p / (g * q))
+        change = change - (value * slope / a) * dc + (value * (slope * p - 1) / a) * da
+    return value, change
 
 
 @stable.widened
