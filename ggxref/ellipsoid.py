@@ -23,7 +23,10 @@ def times(A: Mat3, x: Real, y: Real, z: Real) -> tuple[Scalar, Scalar, Scalar]:
 
 
 def times_exactly(A: Mat3, w: Vec3) -> tuple[Scalar, Scalar, Scalar]:
-    """`A w`, each component rounded once: under skew and strong anisotropy the plain sums cancel."""
+    """`A w`, each component rounded once: under skew and strong anisotropy the plain sums cancel.
+
+    - `A`: (3, 3). `w`: (3,). Returns the three components.
+    """
     x, y, z = map(_pairs.rounded, _pairs.times(A, tuple(w)))
     return x, y, z
 
@@ -42,7 +45,7 @@ def cofactor(A: Mat3) -> tuple[Mat3, Scalar]:
 
 @stable.widened
 def determinant(A: Mat3) -> Scalar:
-    """det A, rounded once."""
+    r"""$\det A$, of either sign, rounded once. `A`: (3, 3)."""
     return _pairs.rounded(_pairs.determinant(A))
 
 
