@@ -150,4 +150,6 @@ def pdf(wm: Vec3, wi: Vec3, alpha: Vec2, table: Table) -> Scalar:
     seen = (cosine > 0) & (wm[2] > 0) & (wi[2] > 0)
     z = jnp.where(seen, wm[2], 1)
     value = table.density(jnp.stack([-wm[0] / (z * alpha[0]), -wm[1] / (z * alpha[1])]))
-    return jnp.where(seen, cosine * value / (alpha[0] * z**2) / (alpha[1] * z**2) / sigma, 0)
+    # Factors, not quotients of quotients, which XLA divides by at once: z⁴ and more of it in the derivative underflow.
+    lifted = value * (1 / (z * z)) * (1 / (z * z))
+    return jnp.where(seen, lifted * ((cosine / sigma) / (alpha[0] * alpha[1])), 0)
