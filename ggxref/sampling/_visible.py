@@ -36,8 +36,7 @@ def pdf_beckmann(wm: Vec3, wi: Vec3, alpha: Vec2) -> Scalar:
     """
     cosine = stable.cosine(wi, wm)
     share = over_beckmann(tuple(wi), tuple(wm), tuple(alpha), slopes.sigma_beckmann(wi, alpha), cosine)
-    # The share first, which is finite: in the tails cosine · D is 0 where the density is not.
-    return jnp.where(cosine > 0, ndf.beckmann(wm, alpha) * share, 0)
+    return jnp.where(cosine > 0, ndf.beckmann_times(wm, alpha, share), 0)
 
 
 @stable.widened
