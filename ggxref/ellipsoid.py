@@ -345,6 +345,7 @@ def lune_area(u: Vec3, v: Vec3, A: Mat3, size: Real) -> Scalar:
     return math.pi * (size * scale) ** 2 * ratio / (2 * jnp.abs(determinant(A)))
 
 
+@stable.widened
 def mean_normal(A: Mat3) -> Vec3:
     r"""Average normal of the half ellipsoid $m\cdot n > 0$, by area: $A^T A n / \|A^T A n\|$: unit, (3,).
 

@@ -36,7 +36,7 @@ def _amplitudes(c, eta):
     ct = stable.sqrt(square)
     # Both numerators times their conjugates: ηc − c_t and c − ηc_t cancel as η → 1, these do not.
     s_sum, p_sum = eta * c + ct, c + eta * ct
-    fine = (s_sum > 0) & (square > 0) & (gap != 0)
+    fine = ~((s_sum <= 0) | (square <= 0) | (gap == 0))  # also NaN, which stays NaN
     s_sum, p_sum = jnp.where(fine, s_sum, 1), jnp.where(fine, p_sum, 1)
     r_s = -gap / s_sum**2
     r_p = gap * (c * c - eta**2 * (1 - c) * (1 + c)) / p_sum**2
