@@ -4,7 +4,6 @@ The shape matrix `A` is (3, 3) and non-singular, with $\det A$ inside the dtype'
 orthogonal give one distribution of normals. `size` is $C_e$ (walter2014 §2.4); areas are in its unit squared.
 """
 
-import functools
 import math
 from typing import NamedTuple
 
@@ -71,10 +70,10 @@ def reciprocal_scale(x: Scalar) -> Scalar:
 
 
 def near_one(A: Mat3) -> tuple[Mat3, Scalar]:
-    """`A` times a power of two that brings its largest number to about 1, and that factor: `c A` is the same distribution, but
-    its minors, of which there are products, would leave the range for c = 1e12.
+    """`A` times a power of two that brings A n to about 1, and that factor: `c A` is the same distribution, but its minors, of
+    which there are products, would leave the range for c = 1e12.
     """
-    scale = reciprocal_scale(functools.reduce(jnp.maximum, [jnp.abs(x) for row in A for x in row]))
+    scale = reciprocal_scale(jnp.abs(A[0, 2]) + jnp.abs(A[1, 2]) + jnp.abs(A[2, 2]))
     return A * scale, scale
 
 

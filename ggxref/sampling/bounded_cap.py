@@ -12,11 +12,11 @@ from ggxref.sampling._sphere import half_in_cap, ray, unstretch
 def _bound_terms(wi, alpha):
     """k and 1 − k, each without cancellation."""
     a = jnp.minimum(jnp.minimum(alpha[0], alpha[1]), 1)
-    w = wi[2] / (1 + length(wi[0], wi[1], 0))
-    denominator = 1 + (a * w) ** 2
+    square = (wi[2] / (1 + length(wi[0], wi[1], 0))) ** 2
+    denominator = 1 + a * a * square
     below = wi[2] <= 0  # said so that a NaN shows
     k = jnp.where(below, 1, stable.one_minus_square(a) / denominator)
-    return k, jnp.where(below, 0, a * a * (1 + w * w) / denominator)
+    return k, jnp.where(below, 0, a * a * (1 + square) / denominator)
 
 
 @stable.widened
