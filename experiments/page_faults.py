@@ -2,7 +2,7 @@
 
     python experiments/page_faults.py
 
-Above 32 MB glibc asks the operating system for each array anew, a page at a time. The environment is read when a process
+glibc gives large arrays back to the operating system, and asks for the next anew, a page at a time. The environment is read when a process
 starts, hence one process for each setting. Components are arrays of their own, of 16 MB; "packed": in one of 48 MB.
 "donated": the result takes the place of ω_i.
 """

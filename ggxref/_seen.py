@@ -24,22 +24,27 @@ def over_ggx(w: Triple, m: Triple, alpha: Two, k: Real, cosine: Scalar) -> Scala
 
     0 where the denominator underflows. `cosine` is $\omega\cdot m$.
     """
-    return cosine / _area(w, alpha, k)[0]
+    return cosine / _unless_underflown(area_ggx(w, alpha, k))
 
 
-def _area(w, alpha, k):
-    """The denominator, s² and t."""
+def area_ggx(w: Triple, alpha: Two, k: Real) -> Scalar:
+    """The denominator of `over_ggx`."""
     square = (alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2
     t = stable.sqrt(square + w[2] ** 2)
     below = w[2] < 0
-    area = jnp.where(below, square / jnp.where(below, t - w[2], 1), t + k * w[2])  # t + z cancels below the horizon
-    return jnp.where(area >= jnp.finfo(area.dtype).tiny, area, jnp.inf), square, jnp.where(t > 0, t, 1)
+    return jnp.where(below, square / jnp.where(below, t - w[2], 1), t + k * w[2])  # t + z cancels below the horizon
+
+
+def _unless_underflown(area):
+    return jnp.where(area < jnp.finfo(area.dtype).tiny, jnp.inf, area)
 
 
 @over_ggx.defjvp
 def _over_ggx_jvp(primals, tangents):
     w, _, alpha, k, cosine = primals
-    area, square, t = _area(w, alpha, k)
+    square, area = (alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2, _unless_underflown(area_ggx(w, alpha, k))
+    t = stable.sqrt(square + w[2] ** 2)
+    t = jnp.where(t > 0, t, 1)
     by_z = jnp.where(w[2] < 0, area / t, w[2] / t + k)
     by_z = jnp.where(area < jnp.inf, by_z, 0)
     quotient = cosine / area
@@ -50,7 +55,7 @@ def _over_ggx_jvp(primals, tangents):
 @jax.custom_jvp
 def over_beckmann(w: Triple, m: Triple, alpha: Two, sigma: Scalar, cosine: Scalar) -> Scalar:
     r"""$\omega\cdot m/\sigma(\omega)$ for Beckmann's σ; 0 where it underflows. `cosine` is $\omega\cdot m$."""
-    return cosine / jnp.where(sigma >= jnp.finfo(sigma.dtype).tiny, sigma, jnp.inf)
+    return cosine / _unless_underflown(sigma)
 
 
 @over_beckmann.defjvp
@@ -60,7 +65,7 @@ def _over_beckmann_jvp(primals, tangents):
     s = jnp.sqrt(jnp.where(square > 0, square, 1))
     a = jnp.where(square > 0, jnp.clip(w[2] / s, -30, 30), 30 * jnp.sign(w[2]))
     by_s = jnp.exp(-a * a) / (2 * math.sqrt(math.pi))
-    area = jnp.where(sigma >= jnp.finfo(sigma.dtype).tiny, sigma, jnp.inf)
+    area = _unless_underflown(sigma)
     quotient = cosine / area
     return quotient, _change(primals, tangents, quotient, area, erfc(-a) / 2, by_s / s, s * by_s)
 

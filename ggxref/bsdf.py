@@ -37,6 +37,7 @@ def brdf_ggx(wi: Vec3, wo: Vec3, alpha: Vec2) -> Scalar:
 
     - `wi`, `wo`: unit, (3,); 0 unless both are above the horizon. `alpha`: positive, (2,).
     - F's cosine, $\omega_i\cdot\omega_h$, is $\|h\|/2$.
+    - Its gradient is cut to the end of the dtype's range, which it leaves towards the horizon.
 
     tokuyoshi2024's D and dupuy2023 (13) in walter2014 (4): the heights of G2 and of the denominator cancel, h is never
     normalised, and no digit is lost where $\omega_o$ is nearly $-\omega_i$. A third of the composition's time.
@@ -119,6 +120,7 @@ def btdf(wi: Vec3, wo: Vec3, n_i: Real, n_o: Real, D: Real, G2: Real, F: Real) -
     return _over(transmitted, jnp.abs(wi[2]) * jnp.abs(wo[2]))
 
 
+@stable.widened
 def weight_normals(wi: Vec3, wm: Vec3, G2: Real) -> Scalar:
     r"""Weight of a sample from $D(\omega_m\cdot n)$: $|\omega_i\cdot\omega_m| G_2 / (|\omega_i\cdot n||\omega_m\cdot n|)$; F is in the choice.
 

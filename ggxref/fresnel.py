@@ -12,6 +12,7 @@ from ggxref import stable
 from ggxref._types import Real, Scalar
 
 
+@stable.widened
 def dielectric(cos_i: Real, eta: Real) -> Scalar:
     r"""$F = (R_s^2 + R_p^2)/2$, $R_s = \frac{\eta c - c_t}{\eta c + c_t}$, $R_p = \frac{c - \eta c_t}{c + \eta c_t}$,
     $c_t = \sqrt{1 - \eta^2(1 - c^2)}$; 1 in total reflection, 0 at `eta = 1`.
@@ -20,7 +21,7 @@ def dielectric(cos_i: Real, eta: Real) -> Scalar:
 
     Fresnel's equations (Walter et al. 2007 (22)), used by heitz2014 §2.1 and walter2014 §1.1.
     """
-    return _dielectric(jnp.asarray(cos_i), jnp.asarray(eta))
+    return _dielectric(*stable.floats(cos_i, eta))
 
 
 @jax.custom_jvp
@@ -61,6 +62,7 @@ def _dielectric_jvp(primals, tangents):
     return _dielectric(*primals), jnp.where(fine, by_c * jnp.sign(cosine), 0) * dc + jnp.where(fine, by_eta, 0) * deta
 
 
+@stable.widened
 def conductor(cos_i: Real, eta: Real, k: Real) -> Scalar:
     r"""$F$ for the complex index $\eta + ik = n_o/n_i$ of the metal, relative to the side that the light is on.
 
@@ -70,7 +72,7 @@ def conductor(cos_i: Real, eta: Real, k: Real) -> Scalar:
 
     Fresnel's equations for absorbing media, as in heitz2014 §2.1 and walter2014 §1.1 ("complex index of refraction").
     """
-    return _conductor(jnp.asarray(cos_i), jnp.asarray(eta), jnp.asarray(k))
+    return _conductor(*stable.floats(cos_i, eta, k))
 
 
 @jax.custom_jvp
@@ -91,9 +93,9 @@ def _conductor(cosine, eta, k):
     # Each numerator and denominator as a sum of squares, and one quotient of them all.
     s_minus, s_plus = difference * difference + b_square, total * total + b_square
     p_minus, p_plus = ((a * c + sign * sin_square) ** 2 + b_square * c * c for sign in (-1, 1))
-    p_plus, p_minus = (jnp.where(p_plus > 0, p, 1) for p in (p_plus, p_minus))
+    p_plus, p_minus = (jnp.where(p_plus <= 0, 1, p) for p in (p_plus, p_minus))
     whole = s_plus * p_plus
-    return jnp.where(whole > 0, s_minus * (p_plus + p_minus) / (2 * jnp.where(whole > 0, whole, 1)), 0)
+    return jnp.where(whole <= 0, 0, s_minus * (p_plus + p_minus) / (2 * jnp.where(whole <= 0, 1, whole)))
 
 
 @_conductor.defjvp
@@ -139,7 +141,7 @@ def schlick(cos_i: Real, f0: Real) -> Scalar:
 
     Schlick 1994.
     """
-    return _schlick(jnp.asarray(cos_i), jnp.asarray(f0))
+    return _schlick(*stable.floats(cos_i, f0))
 
 
 @jax.custom_jvp

@@ -125,7 +125,7 @@ def g2_height_correlated(g1_i: Real, g1_o: Real) -> Scalar:
 
     dupuy2023 (13).
     """
-    return _correlated(jnp.asarray(g1_i), jnp.asarray(g1_o))
+    return _correlated(*stable.floats(g1_i, g1_o))
 
 
 def g2_v_cavity(wi: Vec3, wo: Vec3, wm: Vec3) -> Scalar:

@@ -45,7 +45,10 @@ def beckmann(wm: Vec3, alpha: Vec2) -> Scalar:
 
 
 def beckmann_times(wm: Vec3, alpha: Vec2, factor: Real) -> Scalar:
-    """`beckmann` times a factor, by which its tails may be within the dtype's range where D itself is not."""
+    """`beckmann` times a factor, by which its tails may be within the dtype's range where D itself is not.
+
+    - `wm`: unit, (3,). `alpha`: positive, (2,). `factor`: a number.
+    """
     rho, z_square = _stretched(wm, alpha), wm[2] ** 2
     # Beyond this exponent D is 0 in the dtype; towards the horizon z⁴ then is 0 too, and D or its gradient 0/0.
     seen = (wm[2] > 0) & (rho < -2 * math.log(float(jnp.finfo(wm.dtype).tiny)) * z_square)
@@ -54,7 +57,7 @@ def beckmann_times(wm: Vec3, alpha: Vec2, factor: Real) -> Scalar:
     exponent, rest = _pairs.tangent_square(x, y, z, alpha[0], alpha[1])
     # Half the exponent twice: the peak 1/(π αx αy) reaches into tails where the exponential alone has underflowed.
     half = jnp.exp(-exponent / 2)
-    D = half * (half * (1 - rest) * (factor / (math.pi * alpha[0] * z_square * (alpha[1] * z_square))))
+    D = (half * factor) * (half * (1 - rest) / (math.pi * alpha[0] * z_square * (alpha[1] * z_square)))
     return jnp.where(seen, D, 0)
 
 

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 
 from ggxref import _pairs, stable
-from ggxref._seen import over_beckmann, over_ggx
+from ggxref._seen import area_ggx, over_beckmann, over_ggx
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import canonical
 
@@ -92,7 +92,7 @@ def student(x: Scalar, y: Scalar, z: Scalar, ax: Scalar, ay: Scalar, gamma: Scal
     # With q = z² + ρ/(γ−1) this is (z²/q)^(γ−2) / (π αx αy q²): nothing is divided by z.
     share, _, q = _student_parts(x, y, z, ax, ay, gamma)
     half = jnp.exp((1 - gamma / 2) * share)  # twice, as in `beckmann`
-    return half * (half / (math.pi * (ax * q) * (ay * q)))
+    return jnp.where(q == jnp.inf, 0, (half / (ax * q)) * (half / (math.pi * (ay * q))))
 
 
 def _student_parts(x, y, z, ax, ay, gamma):
@@ -138,11 +138,7 @@ def ellipsoid(slope: Vec2, A: Mat3) -> Scalar:
 @stable.widened
 def sigma_ggx(w: Vec3, alpha: Vec2) -> Scalar:
     r"""$\sigma = (z + \|(\alpha_x x, \alpha_y y, z)\|)/2$, for `w` anywhere. dupuy2023 (4) after the stretch."""
-    square = (alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2
-    t = stable.sqrt(square + w[2] ** 2)
-    # Below the horizon t + z cancels.
-    below = w[2] < 0
-    return jnp.where(below, square / jnp.where(below, t - w[2], 1), t + w[2]) / 2
+    return area_ggx(tuple(w), tuple(alpha), 1.0) / 2
 
 
 def gaussian_tail(w, alpha):

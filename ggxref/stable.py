@@ -252,7 +252,7 @@ _RSQRT = {jnp.dtype("float32"): (jnp.uint32, 0x5F3759DF, 3), jnp.dtype("float64"
 @jax.custom_jvp
 @traced_once
 def rsqrt(x: Scalar) -> Scalar:
-    r"""$1/\sqrt x$ to within 1 ulp, for positive `x` in the normal range.
+    r"""$1/\sqrt x$ to within 1 ulp, for positive finite `x` in the normal range.
 
     By Newton's method, all products: XLA cuts a loop in two at a root or a quotient that several of its results use.
     """
@@ -269,6 +269,12 @@ def _rsqrt_jvp(primals, tangents):
     (x,), (dx,) = primals, tangents
     root = rsqrt(x)
     return root, -0.5 * root / x * dx
+
+
+def floats(*numbers: Real) -> tuple[Array, ...]:
+    """As arrays of their common floating dtype: a rule of differentiation takes no integer, and one dtype for all."""
+    dtype = jnp.result_type(*numbers, 1.0)
+    return tuple(jnp.asarray(x, dtype) for x in numbers)
 
 
 @jax.custom_jvp
@@ -293,7 +299,7 @@ def _turning_jvp(primals, tangents):
         held * ((p * p + r * r) * dy - q * (p * dx + r * dz)),
         held * ((p * p + q * q) * dz - r * (p * dx + q * dy)),
     )
-    return primals, turned
+    return turning(*primals), turned
 
 
 @widened

@@ -18,6 +18,7 @@ def workers(jobs: int) -> Iterator[Callable[..., Any]]:
         yield lambda f, *arguments: lambda: f(*arguments)
         return
     # Interrupts are this process's to handle; `spawn` because a fork of a process with threads may hang.
+    before = multiprocessing.active_children()
     pool = ProcessPoolExecutor(
         jobs, multiprocessing.get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_IGN)
     )
@@ -25,7 +26,8 @@ def workers(jobs: int) -> Iterator[Callable[..., Any]]:
         yield lambda f, *arguments: pool.submit(f, *arguments).result
     except BaseException:
         for process in multiprocessing.active_children():
-            process.terminate()
+            if process not in before:
+                process.terminate()
         raise
     finally:
         pool.shutdown(cancel_futures=True)

@@ -56,19 +56,20 @@ def test_a_lost_term_is_caught_by_the_oracle():
     def frozen(w, wm, alpha):
         return library("masking.g1_ggx")(w, wm, jax.lax.stop_gradient(alpha))
 
-    found = measure("masking.g1_ggx", frozen, ("w", "wm", "alpha"), "smooth", 64, library("masking.g1_ggx"))
-    assert found.worst > 0.9 and found.worst_block.startswith("alpha")
+    with jax.enable_x64(True):
+        found = proof("masking.g1_ggx", frozen, ("w", "wm", "alpha"), "rough", 2)
+    assert found.max() > 0.1
 
 
 def test_second_derivatives_of_a_direction():
-    """`unit` takes what lengthens the vector out of its first derivative, and must not out of the second."""
+    """`unit` takes what lengthens the vector out of its first derivative, and must not out of the second, nor of what follows."""
 
     def plain(v):
-        return (v / jnp.sqrt(v @ v)) @ jnp.arange(1.0, 4.0)
+        return ((v / jnp.sqrt(v @ v)) @ jnp.arange(1.0, 4.0)) ** 2
 
     with jax.enable_x64(True):
         v = jnp.asarray([0.3, -0.2, 1.4])
-        found = jax.jit(jax.hessian(lambda v: jnp.stack(stable.unit(*v)) @ jnp.arange(1.0, 4.0)))(v)
+        found = jax.jit(jax.hessian(lambda v: (jnp.stack(stable.unit(*v)) @ jnp.arange(1.0, 4.0)) ** 2))(v)
         np.testing.assert_allclose(found, jax.jit(jax.hessian(plain))(v), atol=1e-14)
 
 

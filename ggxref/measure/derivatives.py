@@ -202,7 +202,9 @@ def proof(name: str, function: Callable, draws: tuple[str, ...], region: str, co
             inputs = {n: b[..., k] for n, b in zip(names, args, strict=True)}
             columns = jacobians[:, cut, k]
             along = np.ravel(change) if argument == block else change[int(block[-2])][None]
-            size = np.linalg.norm(columns) * np.linalg.norm(along)
-            if np.isfinite(size) and size > FLOOR:
-                found.append(np.abs(columns @ along - quotient(name, inputs, argument, change)).max() / size)
+            expected = quotient(name, inputs, argument, change)
+            size = max(np.linalg.norm(columns) * np.linalg.norm(along), np.abs(expected).max())
+            if not size <= FLOOR:
+                error = np.abs(columns @ along - expected).max() / size
+                found.append(error if np.isfinite(error) else np.inf)
     return np.array(found)

@@ -130,7 +130,7 @@ MUTANTS = [
     Mutant("slopes.from_normal", "sign lost", lambda f: lambda wm: -f(wm)),
     Mutant("slopes.to_normal", "not normalised", lambda f: lambda slope: f(slope) / f(slope)[2]),
     Mutant("slopes.stretch", "divided", lambda f: lambda w, factors: f(w, 1 / factors)),
-    Mutant("slopes.sigma_ggx", "|z| for z", lambda f: lambda w, alpha: f(w.at[2].set(jnp.abs(w[2])), alpha), "sampling.slope_ggx.pdf"),
+    Mutant("_seen.area_ggx", "|z| for z", lambda f: lambda w, alpha, k: f((w[0], w[1], jnp.abs(w[2])), alpha, k), "sampling.slope_ggx.pdf"),
     Mutant("slopes.sigma_beckmann", "axes swapped", lambda f: lambda w, alpha: f(w, swap(alpha)), "sampling.slope_beckmann.pdf"),
     # masking
     Mutant("masking.lambda_ggx", "without the half", lambda f: lambda w, alpha: 2 * f(w, alpha)),
