@@ -1,6 +1,8 @@
 """What does a kernel cost beside Mitsuba's and beside a copy of its bytes, and what does it lose? Writes docs/speed-accuracy.md's table.
 
-    python experiments/kernels.py docs/speed-accuracy.md
+    taskset -c 0 python experiments/kernels.py docs/speed-accuracy.md
+
+One core: on two, what a virtual machine's host takes from either makes a loop in two halves wait for the later one.
 
 float32, one material (α = 0.3, 0.1), all kernels of a size in one interleaved run, vectors as three arrays (Mitsuba's way)
 but in the row that says otherwise. Errors are the largest that sampling and

@@ -3,6 +3,7 @@
 A subject is a call without arguments that returns when its result is there.
 """
 
+import os
 import platform
 import time
 from collections.abc import Callable, Iterable
@@ -46,10 +47,10 @@ class Compiled:
 
 
 def machine() -> str:
-    """The processor, and what runs on it: for the caption of every figure of speed."""
+    """The processors that this process may use, and what runs on them: for the caption of every figure of speed."""
     info = Path("/proc/cpuinfo")
     names = [line.split(":")[1].strip() for line in info.read_text().splitlines() if line.startswith("model name")]
-    count = len(names) or 1
+    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return f"{count} x {names[0] if names else platform.processor()}, jax {jax.__version__}, {platform.system()}"
 
 
