@@ -27,9 +27,14 @@ def over_ggx(w: Triple, m: Triple, alpha: Two, k: Real, cosine: Scalar) -> Scala
     return cosine / _unless_underflown(area_ggx(w, alpha, k))
 
 
+def _square(w, alpha):
+    """s²."""
+    return (alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2
+
+
 def area_ggx(w: Triple, alpha: Two, k: Real) -> Scalar:
     """The denominator of `over_ggx`."""
-    square = (alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2
+    square = _square(w, alpha)
     t = stable.sqrt(square + w[2] ** 2)
     below = w[2] < 0
     return jnp.where(below, square / jnp.where(below, t - w[2], 1), t + k * w[2])  # t + z cancels below the horizon
@@ -42,7 +47,7 @@ def _unless_underflown(area):
 @over_ggx.defjvp
 def _over_ggx_jvp(primals, tangents):
     w, _, alpha, k, cosine = primals
-    square, area = (alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2, _unless_underflown(area_ggx(w, alpha, k))
+    square, area = _square(w, alpha), _unless_underflown(area_ggx(w, alpha, k))
     t = stable.sqrt(square + w[2] ** 2)
     t = jnp.where(t > 0, t, 1)
     by_z = jnp.where(w[2] < 0, area / t, w[2] / t + k)
@@ -61,7 +66,7 @@ def over_beckmann(w: Triple, m: Triple, alpha: Two, sigma: Scalar, cosine: Scala
 @over_beckmann.defjvp
 def _over_beckmann_jvp(primals, tangents):
     w, _, alpha, sigma, cosine = primals
-    square = (alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2
+    square = _square(w, alpha)
     s = jnp.sqrt(jnp.where(square > 0, square, 1))
     a = jnp.where(square > 0, jnp.clip(w[2] / s, -30, 30), 30 * jnp.sign(w[2]))
     by_s = jnp.exp(-a * a) / (2 * math.sqrt(math.pi))
