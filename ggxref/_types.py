@@ -11,6 +11,4 @@ Vec2 = Float[Array, "2"]
 Vec3 = Float[Array, "3"]
 Mat2 = Float[Array, "2 2"]
 Mat3 = Float[Array, "3 3"]
-Turn = Callable[
-    [Scalar], tuple[Scalar, Scalar]
-]  # a form of (cos 2πu, sin 2πu): `stable.cos_sin_turn`, or a cheaper one
+Turn = Callable[[Scalar], tuple[Scalar, Scalar]]  # (cos 2πu, sin 2πu): `_special.cos_sin_turn`, or a cheaper form

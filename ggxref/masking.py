@@ -9,7 +9,7 @@ other side (walter2014 (7)), as transmission needs. All directions are unit, (3,
 import jax
 import jax.numpy as jnp
 
-from ggxref import stable
+from ggxref import _squares, stable
 from ggxref._seen import over_beckmann, over_ggx
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import sigma as sigma_ellipsoid
@@ -19,7 +19,7 @@ from ggxref.slopes import gaussian_tail, sigma_beckmann
 @stable.widened
 def lambda_ggx(w: Vec3, alpha: Vec2) -> Scalar:
     r"""$\Lambda = (-1 + \sqrt{1 + (\alpha_x^2 x^2 + \alpha_y^2 y^2)/z^2})/2$; infinite at the horizon. tokuyoshi2024."""
-    square = stable.scaled_square(w, alpha)
+    square = _squares.scaled_square(w, alpha)
     z = jnp.abs(w[2])
     return square / (2 * z * (z + stable.sqrt(square + z * z)))  # -1 + sqrt(1 + a²) cancels for small a
 

@@ -8,7 +8,7 @@ import math
 
 import jax.numpy as jnp
 
-from ggxref import _pairs, stable
+from ggxref import _pairs, _squares, stable
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import inverse_square, near_one
 from ggxref.slopes import student
@@ -30,8 +30,8 @@ def ggx(wm: Vec3, alpha: Vec2) -> Scalar:
     tokuyoshi2024; dupuy2023 (12); walter2014 (1) with A = diag(αx, αy, 1).
     """
     # A sum of squares: cos²(α² − 1) + 1, its equal on unit vectors, has lost every digit at α = 1e-4.
-    q = stable.stretched_square(wm, alpha)
-    D = stable.lobe(alpha[0], alpha[1], q)
+    q = _squares.stretched_square(wm, alpha)
+    D = _squares.lobe(alpha[0], alpha[1], q)
     return jnp.where(wm[2] > 0, D, 0)
 
 
@@ -91,5 +91,5 @@ def ellipsoid(wm: Vec3, A: Mat3) -> Scalar:
 def ellipsoid_of(wm: Vec3, A: Mat3, q: Scalar, det: Scalar) -> Scalar:
     """`ellipsoid` from what `inverse_square(wm, A)` gave."""
     An = jnp.sqrt(stable.dot(A[:, 2], A[:, 2]))
-    D = stable.lobe(det, An, q)
+    D = _squares.lobe(det, An, q)
     return jnp.where(wm[2] > 0, D, 0)

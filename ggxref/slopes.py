@@ -10,7 +10,7 @@ import math
 import jax
 import jax.numpy as jnp
 
-from ggxref import _pairs, stable
+from ggxref import _pairs, _special, _squares, stable
 from ggxref._seen import area_ggx, over_beckmann, over_ggx
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import canonical
@@ -51,7 +51,7 @@ def _bell(x, y, a, b, c):
     r"""$1/(\pi a b (1 + u^2 + v^2)^2)$ with $u = x/a$, $v = (y - c u)/b$. Its derivatives do not underflow before it does."""
     u = x / a
     v = (y - c * u) / b
-    return stable.lobe(a, b, 1 + u * u + v * v)
+    return _squares.lobe(a, b, 1 + u * u + v * v)
 
 
 @_bell.defjvp
@@ -143,14 +143,14 @@ def sigma_ggx(w: Vec3, alpha: Vec2) -> Scalar:
 
 def gaussian_tail(w, alpha):
     """`s = ‖(αx x, αy y)‖` and `ierfc(|z|/s)`, which is 0 at normal incidence: |z| Λ(w) is half their product."""
-    square = stable.scaled_square(w, alpha)
+    square = _squares.scaled_square(w, alpha)
     s = jnp.sqrt(jnp.where(square > 0, square, 1))
     # From 30 on, ierfc is 0 in every dtype; the limit only stops the overflow of z/s at normal incidence.
     a = jnp.minimum(jnp.abs(w[2]), 30 * s) / s
     seen = (square > 0) & (a < 30)
     x, z = jnp.where(seen, w[0], 1), jnp.where(seen, w[2], 1)
     exponent, rest = _pairs.height_square(x, jnp.where(seen, w[1], 1), z, alpha[0], alpha[1])
-    return s, jnp.where(seen, stable.ierfc(a, (exponent, rest)), 0)
+    return s, jnp.where(seen, _special.ierfc(a, (exponent, rest)), 0)
 
 
 @stable.widened

@@ -5,7 +5,6 @@ derivative returned is 0, so that a gradient never holds NaN.
 """
 
 import functools
-import math
 from collections.abc import Callable
 
 import jax
@@ -13,8 +12,8 @@ import jax.numpy as jnp
 from jax import Array, lax
 from jaxtyping import Bool, Float
 
-from ggxref._errorfree import collected, quotient, traced_once, two_product, two_sum
-from ggxref._types import Real, Scalar, Vec2, Vec3
+from ggxref._errorfree import collected, traced_once, two_product, two_sum
+from ggxref._types import Real, Scalar, Vec3
 
 Components = Float[Array, " n"] | tuple[Float[Array, "..."], ...]
 
@@ -114,7 +113,7 @@ def cross(a: Vec3, b: Vec3) -> Vec3:
 
 
 @widened
-def excess(w: Vec3) -> Scalar:
+def excess(w: Vec3 | tuple[Scalar, Scalar, Scalar]) -> Scalar:
     """By how much the length of `w`, a unit vector before it was rounded, exceeds 1: `(w·w − 1)/2`, to within ε²."""
     return _excess(*w)
 
@@ -153,71 +152,6 @@ def weighted_sum(a: Vec3, b: Vec3, n_a: Real, n_b: Real) -> tuple[Scalar, Scalar
 
     x, y, z = map(component, a, b)
     return x, y, z
-
-
-@widened
-def stretched_square(w: Vec3, alpha: Vec2) -> Scalar:
-    r"""$(x^2/\alpha_x^2 + y^2/\alpha_y^2 + z^2) / \|w\|^2$, rounded once; its derivative is that of the numerator.
-
-    D is the inverse of its square: half of D's error came from here, and half of that from a `w` that is unit only to its
-    dtype.
-    """
-    return _stretched_square(w[0], w[1], w[2], alpha[0], alpha[1])
-
-
-@widened
-def scaled_square(w: Vec3, alpha: Vec2) -> Scalar:
-    r"""$\alpha_x^2 x^2 + \alpha_y^2 y^2$, rounded once: plainly, half of Λ's error."""
-    return _scaled_square(w[0], w[1], alpha[0], alpha[1])
-
-
-@jax.custom_jvp
-def _scaled_square(x, y, ax, ay):
-    (p, p_rest), (q, q_rest) = two_product(ax, x), two_product(ay, y)
-    total, errors = collected([two_product(c, c) for c in (p, q)])
-    return total + (sum(errors) + 2 * (p * p_rest + q * q_rest))
-
-
-@_scaled_square.defjvp
-def _scaled_square_jvp(primals, tangents):
-    (x, y, ax, ay), (dx, dy, dax, day) = primals, tangents
-    return _scaled_square(*primals), 2 * (ax * x * (ax * dx + x * dax) + ay * y * (ay * dy + y * day))
-
-
-@jax.custom_jvp
-def _stretched_square(x, y, z, ax, ay):
-    (p, p_rest), (q, q_rest) = quotient(x, ax), quotient(y, ay)
-    total, errors = collected([two_product(c, c) for c in (p, q, z)])
-    longer = 2 * _excess(x, y, z)
-    square = jnp.where(longer > -1, 1 + longer, 1)  # ‖w‖², but for the zero vector
-    return total + (sum(errors) + 2 * (p * p_rest + q * q_rest) - total * (longer / square))
-
-
-@_stretched_square.defjvp
-def _stretched_square_jvp(primals, tangents):
-    (x, y, z, ax, ay), (dx, dy, dz, dax, day) = primals, tangents
-    p, q = x / ax, y / ay
-    change = p * ((dx - p * dax) / ax) + q * ((dy - q * day) / ay) + z * dz
-    return _stretched_square(*primals), 2 * change
-
-
-def log1p(x: Scalar) -> Scalar:
-    """`log(1 + x)`. XLA's own, in float64, is 129 ULP off on (−0.42, −0.29), where `1 + x` has digits enough."""
-    far = x < -0.29
-    return jnp.where(far, jnp.log(1 + jnp.where(far, x, 0)), jnp.log1p(jnp.where(far, 0, x)))
-
-
-@jax.custom_jvp
-def lobe(a: Scalar, b: Scalar, q: Scalar) -> Scalar:
-    r"""$1/(\pi a b q^2)$, the shape of every GGX: each product within the range, and in the derivative each quotient."""
-    return 1 / (math.pi * (a * q) * (b * q))
-
-
-@lobe.defjvp
-def _lobe_jvp(primals, tangents):
-    value = lobe(*primals)
-    da, db, dq = (dx / x for x, dx in zip(primals, tangents, strict=True))
-    return value, -value * (da + db + 2 * dq)
 
 
 @jax.custom_jvp
@@ -366,155 +300,3 @@ def _azimuth_jvp(primals, tangents):
     square = x * x + y * y
     turn = (cosine * dy - sine * dx) / jnp.sqrt(jnp.where(square > 0, square, 1))
     return (cosine, sine), (-sine * turn, cosine * turn)
-
-
-# Taylor coefficients of sin 2πv / v and cos 2πv in v²: on |v| <= 1/8 the first term left out is below half an ulp.
-_SIN = [(-1) ** k * (2 * math.pi) ** (2 * k + 1) / math.factorial(2 * k + 1) for k in range(9)]
-_COS = [(-1) ** k * (2 * math.pi) ** (2 * k) / math.factorial(2 * k) for k in range(9)]
-
-
-def _horner(coefficients, x):
-    value = coefficients[-1]
-    for c in reversed(coefficients[:-1]):
-        value = value * x + c
-    return value
-
-
-def cos_sin_turn(u: Real, terms: int | None = None) -> tuple[Scalar, Scalar]:
-    r"""$(\cos 2\pi u, \sin 2\pi u)$ for `u` in [0, 1].
-
-    `u` is reduced to an eighth of a turn exactly, before the rounding of $\pi$ can enter; the polynomial that is left
-    costs a fraction of the library's functions, which must reduce any argument.
-
-    - `terms`: of each Taylor series, at most 9; without it, as many as the dtype can hold.
-    """
-    u = jnp.asarray(u)
-    cos_terms, sin_terms = (terms, terms) if terms else (9, 9) if u.dtype == jnp.float64 else (6, 5)
-    quarter = jnp.round(4 * u)
-    v = u - quarter / 4
-    square = v * v
-    c, s = _horner(_COS[:cos_terms], square), v * _horner(_SIN[:sin_terms], square)
-    swap = (quarter == 1) | (quarter == 3)
-    c, s = jnp.where(swap, s, c), jnp.where(swap, c, s)
-    negate_cos, negate_sin = (quarter == 1) | (quarter == 2), (quarter == 2) | (quarter == 3)
-    return jnp.where(negate_cos, -c, c), jnp.where(negate_sin, -s, s)
-
-
-# Chebyshev coefficients in t = (a - 3) / (a + 3) of sqrt(pi) (1 + 2 a^2) exp(a^2) ierfc(a), a smooth function that is
-# 1 at both ends of [0, inf). tests/test_stable.py computes them again with arb.
-_IERFC = (
-    0.8983020427745623,
-    0.11262785225761364,
-    0.03571305852948175,
-    -0.08726578763158488,
-    0.059453479214879104,
-    -0.02438560091618397,
-    0.006522770600882268,
-    -0.001005650624929731,
-    1.2794620962747412e-05,
-    2.978488482221082e-05,
-    -4.347826728577626e-06,
-    -6.093356111432701e-07,
-    2.10743212981155e-07,
-    1.1652759571892747e-08,
-    -9.038074775178108e-09,
-    -3.030761419449976e-10,
-    3.982604818145382e-10,
-    1.7577574077580366e-11,
-    -1.8236389678792617e-11,
-    -1.5040092030317944e-12,
-    8.316356698523843e-13,
-    1.2574718318109538e-13,
-    -3.4581066655988014e-14,
-    -9.476313500734717e-15,
-    1.0395855246885352e-15,
-    6.309879635822399e-16,
-    8.575482470432927e-18,
-    -3.562663873637638e-17,
-    -4.9147812293757106e-18,
-    1.4988660813585e-18,
-)
-
-
-def _ierfc_scaled(a):
-    """exp(a²) ierfc(a) for a >= 0."""
-    coefficients = _IERFC if a.dtype == jnp.float64 else _IERFC[:16]
-    t = (a - 3) / (a + 3)
-    b, b_next = jnp.zeros_like(t), jnp.zeros_like(t)
-    for c in reversed(coefficients[1:]):  # Clenshaw
-        b, b_next = c + 2 * t * b - b_next, b
-    return (coefficients[0] + t * b - b_next) / (math.sqrt(math.pi) * (1 + 2 * a * a))
-
-
-@jax.custom_jvp
-def _ierfc(a, square, rest):
-    return _ierfc_scaled(a) * (jnp.exp(-square) * (1 - rest))
-
-
-@_ierfc.defjvp
-def _ierfc_jvp(primals, tangents):
-    return _ierfc(*primals), -jax.scipy.special.erfc(primals[0]) * tangents[0]
-
-
-def ierfc(a: Real, square: tuple[Real, Real] | None = None) -> Scalar:
-    r"""First repeated integral of erfc, $\int_a^\infty \mathrm{erfc} = e^{-a^2}/\sqrt\pi - a\,\mathrm{erfc}(a)$, for `a >= 0`.
-
-    This is the shape of every Gaussian projected area: Beckmann's Λ is `ierfc(a) / (2 a)`. The two terms agree in all
-    but $1/2a^2$ of themselves, hence a Chebyshev series (after Shepherd & Laframboise 1981) times the exponential.
-
-    - `square`: a² in two words: the rounding of `a` alone changes the exponential by 2a² times as much.
-    """
-    a = jnp.asarray(a)
-    return _ierfc(a, *(square or (a * a, jnp.zeros_like(a))))
-
-
-# exp(a²) erfc(a) as a power series: up to a = 1/2 the first term left out is below half an ulp. The functions themselves
-# round twice more, and take the compiler longer.
-_ERFCX = [(-1) ** k / math.gamma(k / 2 + 1) for k in range(28)]
-
-
-def gaussian_tails(a: Real) -> tuple[Scalar, Scalar]:
-    """`exp(a²) erfc(a)` and `exp(a²) ierfc(a)` for `a >= 0`: the tails without their underflow."""
-    scaled = _ierfc_scaled(a)
-    small = a < 0.5
-    direct = _horner(_ERFCX if a.dtype == jnp.float64 else _ERFCX[:16], jnp.where(small, a, 0))
-    return jnp.where(small, direct, (1 / math.sqrt(math.pi) - scaled) / jnp.where(small, 1, a)), scaled
-
-
-def _x_minus_sin(x):
-    """x − sin x for 0 <= x <= pi, without the cancellation at 0."""
-    square = x * x
-    # x^3/3! - x^5/5! + ...: where it is used (x < 1.5), 13 terms reach the last bit of float64.
-    series = _horner([(-1) ** k / math.factorial(2 * k + 3) for k in range(13)], square)
-    return jnp.where(x < 1.5, x * square * series, x - jnp.sin(x))
-
-
-@jax.custom_jvp
-def kepler(v: Real) -> tuple[Scalar, Scalar]:
-    r"""$(\cos\frac E2, \sin\frac E2)$ for the root E in [0, π] of $E - \sin E = 2\pi v$, `v` in [0, 1/2]: Kepler's equation at
-    eccentricity 1.
-
-    E/2 is the angle that cuts the fraction `v` of a disk's area, so this inverts the marginal of a uniform disk.
-    """
-    v = jnp.asarray(v)
-    target = (2 * math.pi) * v
-    # E ~ (6 target)^(1/3) for small targets, and within 16 % of the root everywhere: Halley's third step is exact.
-    E = jnp.cbrt(6 * target)
-    for _ in range(4):
-        f = _x_minus_sin(E) - target
-        slope = 2 * jnp.sin(E / 2) ** 2
-        slope = jnp.where(slope > 0, slope, 1)
-        step = f / slope
-        E = E - step / (1 - 0.5 * step * (jnp.sin(E) / slope))
-    # Towards 1/2 the cosine has the digits of π − E, the root of x + sin x = π − 2πv: one step of Newton's.
-    x = math.pi - E
-    x = x - (x + jnp.sin(x) - (2 * math.pi) * (0.5 - v)) / (1 + jnp.cos(jnp.minimum(x, 2)))
-    far = v > 0.25
-    return jnp.where(far, jnp.sin(x / 2), jnp.cos(E / 2)), jnp.where(far, jnp.cos(x / 2), jnp.sin(E / 2))
-
-
-@kepler.defjvp
-def _kepler_jvp(primals, tangents):
-    c, s = kepler(*primals)
-    turn = jnp.where(s > 0, math.pi / 2 / jnp.where(s > 0, s, 1), 0)  # of E/2, times sin E/2
-    return (c, s), (-turn * tangents[0], turn * (c / jnp.where(s > 0, s, 1)) * tangents[0])

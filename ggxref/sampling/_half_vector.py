@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 from jax import lax
 
-from ggxref import stable
+from ggxref import _special, stable
 from ggxref._types import Real, Scalar, Turn, Vec2
 
 
@@ -18,7 +18,7 @@ def rise_and_fall(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scal
 
 
 def half_in_cap(
-    u: Vec2, x: Scalar, y: Scalar, z: Scalar, cut: Real, turn: Turn = stable.cos_sin_turn
+    u: Vec2, x: Scalar, y: Scalar, z: Scalar, cut: Real, turn: Turn = _special.cos_sin_turn
 ) -> tuple[Scalar, Scalar, Scalar]:
     r"""`i + c` (not normalised) with `i = (x, y, z)` of any length and `c`, as long, uniform on the cap `{c.z > cut - z}`.
 

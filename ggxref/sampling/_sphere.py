@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
-from ggxref import stable
+from ggxref import _special, stable
 from ggxref._types import Real, Scalar, Turn, Vec2, Vec3
 
 
@@ -47,7 +47,7 @@ def incident(x: Scalar, y: Scalar, z: Scalar) -> Incident:
     return Incident(x / norm, y / norm, z / norm, length, rise, fall)
 
 
-def half_in_cap(u: Vec2, i: Incident, cut: Real, turn: Turn = stable.cos_sin_turn) -> tuple[Scalar, Scalar, Scalar]:
+def half_in_cap(u: Vec2, i: Incident, cut: Real, turn: Turn = _special.cos_sin_turn) -> tuple[Scalar, Scalar, Scalar]:
     """`i + c` (not normalised) with `c` uniform on the cap `{z > cut - i.z}`, all in units of i's length.
 
     `cut = 0` is the whole cap of the reflections of the hemisphere (dupuy2023 listing 3); tokuyoshi2024's is

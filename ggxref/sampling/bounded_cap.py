@@ -2,7 +2,7 @@
 
 import jax.numpy as jnp
 
-from ggxref import ndf, stable
+from ggxref import _special, ndf, stable
 from ggxref._seen import over_ggx
 from ggxref._types import Scalar, Turn, Vec2, Vec3
 from ggxref.ellipsoid import length
@@ -32,7 +32,7 @@ def bound(wi: Vec3, alpha: Vec2) -> Scalar:
 
 
 @stable.widened
-def sample(u: Vec2, wi: Vec3, alpha: Vec2, *, turn: Turn = stable.cos_sin_turn) -> Vec3:
+def sample(u: Vec2, wi: Vec3, alpha: Vec2, *, turn: Turn = _special.cos_sin_turn) -> Vec3:
     r"""As `spherical_cap.sample` with the cap $\{z > -k z_i'\}$: only for single reflection.
 
     - `u`: in [0, 1)², (2,). `wi`: unit, (3,), anywhere but straight below. `alpha`: positive, (2,).

@@ -1,6 +1,6 @@
 """Visible GGX normals through the cross-section of the hemisphere: the method of 2018 (dupuy2023 §2)."""
 
-from ggxref import stable
+from ggxref import _special, stable
 from ggxref._types import Turn, Vec2, Vec3
 from ggxref.sampling._sphere import crescent, incident, unstretch
 from ggxref.sampling._visible import pdf_ggx as pdf
@@ -8,7 +8,7 @@ from ggxref.sampling._visible import pdf_ggx as pdf
 __all__ = ["pdf", "sample"]
 
 
-def sample(u: Vec2, wi: Vec3, alpha: Vec2, *, turn: Turn = stable.cos_sin_turn) -> Vec3:
+def sample(u: Vec2, wi: Vec3, alpha: Vec2, *, turn: Turn = _special.cos_sin_turn) -> Vec3:
     """Stretch `wi`, draw a point of the hemisphere's silhouette, lift it to the hemisphere, unstretch.
 
     - `u`: in [0, 1)², (2,). `wi`: unit, (3,), anywhere but straight below. `alpha`: positive, (2,).

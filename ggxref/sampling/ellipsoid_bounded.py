@@ -8,7 +8,7 @@ $o_z' + i_z' \ge i_z/(\|A i\| \max_{\theta\le\theta_1} Q)$. At e = 0 and α ≤ 
 
 import jax.numpy as jnp
 
-from ggxref import ndf, stable
+from ggxref import _special, ndf, stable
 from ggxref._types import Mat3, Scalar, Turn, Vec2, Vec3
 from ggxref.ellipsoid import Canonical, canonical_terms, inverse_square, length, near_one, normal_square
 from ggxref.sampling._half_vector import rise_and_fall
@@ -56,7 +56,7 @@ def bound(wi: Vec3, A: Mat3) -> Scalar:
 
 
 @stable.widened
-def sample(u: Vec2, wi: Vec3, A: Mat3, *, turn: Turn = stable.cos_sin_turn) -> Vec3:
+def sample(u: Vec2, wi: Vec3, A: Mat3, *, turn: Turn = _special.cos_sin_turn) -> Vec3:
     """As `ellipsoid_cap.sample` with the cap's lower end at `bound`: only for single reflection.
 
     - `u`: in [0, 1)², (2,). `wi`: unit, (3,), anywhere but where A ω_i points straight below.

@@ -2,7 +2,7 @@
 
 import jax.numpy as jnp
 
-from ggxref import _pairs, stable
+from ggxref import _pairs, _special, stable
 from ggxref._types import Mat3, Real, Scalar, Turn, Vec2, Vec3
 from ggxref.ellipsoid import Canonical, canonical_terms, reciprocal_scale
 from ggxref.sampling._half_vector import half_in_cap
@@ -35,7 +35,7 @@ def from_sphere(x: Scalar, y: Scalar, z: Scalar, A: Canonical) -> Vec3:
 
 
 @stable.widened
-def sample(u: Vec2, wi: Vec3, A: Mat3, *, turn: Turn = stable.cos_sin_turn) -> Vec3:
+def sample(u: Vec2, wi: Vec3, A: Mat3, *, turn: Turn = _special.cos_sin_turn) -> Vec3:
     r"""With `A` in canonical form, $\omega_m \propto A^T(o' + i')$, $i' = A\omega_i/\|A\omega_i\|$, `o'` uniform on $\{z > -i_z'\}$.
 
     - `u`: in [0, 1)², (2,). `wi`: unit, (3,), anywhere but where A ω_i points straight below.

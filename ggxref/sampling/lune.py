@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from ggxref import _pairs, stable
+from ggxref import _pairs, _special, stable
 from ggxref._types import Mat3, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import cofactor, length, near_one, normal_square, times, times_exactly
 from ggxref.geometry import basis
@@ -19,7 +19,7 @@ def _concentric(u: Vec2) -> tuple[Scalar, Scalar, Scalar]:
     a, b = 2 * u[0] - 1, 2 * u[1] - 1
     wide = jnp.abs(a) > jnp.abs(b)
     r, other = jnp.where(wide, a, b), jnp.where(wide, b, a)
-    c, s = stable.cos_sin_turn(other / (8 * jnp.where(r == 0, 1, r)))
+    c, s = _special.cos_sin_turn(other / (8 * jnp.where(r == 0, 1, r)))
     edge = 2 * jnp.minimum(jnp.minimum(u[0], 1 - u[0]), jnp.minimum(u[1], 1 - u[1]))  # 1 - |r|
     return r * jnp.where(wide, c, s), r * jnp.where(wide, s, c), edge * (2 - edge)
 
@@ -89,7 +89,7 @@ def _first(accepted, wm):
 
 
 def _disk(u):
-    cos_phi, sin_phi = stable.cos_sin_turn(u[0])
+    cos_phi, sin_phi = _special.cos_sin_turn(u[0])
     r = stable.sqrt(u[1])
     return r * cos_phi, r * sin_phi
 

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import erfc
 
-from ggxref import stable
+from ggxref import _special, stable
 from ggxref._types import Scalar, Vec2, Vec3
 from ggxref.sampling._sphere import incident, unstretch
 from ggxref.sampling._visible import pdf_beckmann as pdf
@@ -21,7 +21,7 @@ _DENSITY = 2 / math.sqrt(math.pi)
 def _shares(a, s, c, edge_area):
     r"""The logarithms of $\frac{2}{\sqrt\pi}\int (s a' + c) e^{-a'^2} da'$ over (a, ∞[, for a >= 0, and from the edge −c/s
     to a, for a <= 0; each with the density at a over the integral."""
-    tail, tail_integral = stable.gaussian_tails(jnp.abs(a))
+    tail, tail_integral = _special.gaussian_tails(jnp.abs(a))
     height, tiny = s * a + c, jnp.finfo(a.dtype).tiny
     above = jnp.maximum(s * tail_integral + height * tail, tiny)
     gauss = jnp.exp(-a * a)
@@ -71,7 +71,7 @@ def _quantile(u: Scalar, s: Scalar, c: Scalar) -> Scalar:
     s = jnp.maximum(s, tiny)
     edge = jnp.minimum(c / s, 1 / math.sqrt(tiny))
     floor = jnp.maximum(-edge, 0)  # where the density starts, if it starts above 0
-    _, edge_integral = stable.gaussian_tails(jnp.abs(edge))
+    _, edge_integral = _special.gaussian_tails(jnp.abs(edge))
     edge_area = s * edge_integral * jnp.exp(-edge * edge)
     # Below the horizon the whole density is this one tail; the logarithm outlives its underflow.
     log_total = jnp.where(

@@ -3,7 +3,7 @@
 import jax
 import jax.numpy as jnp
 
-from ggxref import stable
+from ggxref import _special, stable
 from ggxref._types import Vec2, Vec3
 from ggxref.sampling._sphere import incident, unstretch
 from ggxref.sampling._visible import pdf_ggx as pdf
@@ -27,7 +27,7 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
     i = incident(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
     sin_psi, cos_psi = _along(u[0], i.z, stable.sqrt(i.x * i.x + i.y * i.y), i.rise, i.fall)
     upper = u[1] > 0.5
-    c, s = stable.kepler(jnp.where(upper, 1 - u[1], u[1]))
+    c, s = _special.kepler(jnp.where(upper, 1 - u[1], u[1]))
     along, across = -sin_psi * s, jnp.where(upper, -c, c)
     cos_i, sin_i = stable.azimuth(i.x, i.y)
     return unstretch(cos_i * along - sin_i * across, sin_i * along + cos_i * across, cos_psi * s, alpha)

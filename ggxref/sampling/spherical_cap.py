@@ -4,7 +4,7 @@ import math
 
 import jax.numpy as jnp
 
-from ggxref import stable
+from ggxref import _special
 from ggxref._types import Scalar, Turn, Vec2, Vec3
 from ggxref.ellipsoid import length
 from ggxref.sampling._sphere import half_in_cap, ray, unstretch
@@ -13,7 +13,7 @@ from ggxref.sampling._visible import pdf_ggx as pdf
 __all__ = ["cap_pdf", "pdf", "sample"]
 
 
-def sample(u: Vec2, wi: Vec3, alpha: Vec2, *, turn: Turn = stable.cos_sin_turn) -> Vec3:
+def sample(u: Vec2, wi: Vec3, alpha: Vec2, *, turn: Turn = _special.cos_sin_turn) -> Vec3:
     """Stretch `wi`, draw a direction of the cap `{z > -z_i}`, take the half vector, unstretch.
 
     - `u`: in [0, 1)², (2,). `wi`: unit, (3,), anywhere but straight below. `alpha`: positive, (2,).

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array, lax
 
-from ggxref import bsdf, fresnel, geometry, jacobian, masking, ndf, sampling, stable
+from ggxref import _special, bsdf, fresnel, geometry, jacobian, masking, ndf, sampling, stable
 from ggxref._types import Scalar, Turn, Vec2, Vec3
 
 Formula = Callable[..., Array]
@@ -25,9 +25,9 @@ G2S = ("separable", "height_correlated", "v_cavity")
 G2_OF_G1 = {"separable": masking.g2_separable, "height_correlated": masking.g2_height_correlated}
 FRESNELS = ("one", "schlick", "exact")
 TURNS = {
-    "2 terms": lambda u: stable.cos_sin_turn(u, 2),
-    "3 terms": lambda u: stable.cos_sin_turn(u, 3),
-    "exact": stable.cos_sin_turn,
+    "2 terms": lambda u: _special.cos_sin_turn(u, 2),
+    "3 terms": lambda u: _special.cos_sin_turn(u, 3),
+    "exact": _special.cos_sin_turn,
 }
 """Forms of cos 2πu and sin 2πu in a sampler: Taylor polynomials on an eighth of a turn, the last to the dtype's precision."""
 PRECISIONS = {"bfloat16": (8, 7), "float16": (5, 10), "float32": (8, 23)}
@@ -226,7 +226,7 @@ def _direction(kind: Kind, row: Rows, w: Vec3) -> Vec3:
 
 def cosine_lobe(u: Vec2) -> Vec3:
     """A direction with density cos θ/π: unit, (3,)."""
-    c, s = stable.cos_sin_turn(u[0])
+    c, s = _special.cos_sin_turn(u[0])
     r = stable.sqrt(u[1])
     return jnp.stack([r * c, r * s, stable.sqrt(1 - u[1])])
 

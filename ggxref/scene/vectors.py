@@ -11,13 +11,13 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from ggxref import stable
+from ggxref import _special, stable
 
 Tree = TypeVar("Tree")
 Vector = tuple[Array, Array, Array]
 AnyVector = Sequence[Array] | Array
 
-turn = jax.vmap(stable.cos_sin_turn)
+turn = jax.vmap(_special.cos_sin_turn)
 azimuth = jax.vmap(stable.azimuth)
 
 

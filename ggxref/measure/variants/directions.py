@@ -4,7 +4,7 @@ import math
 
 import jax.numpy as jnp
 
-from ggxref import stable
+from ggxref import _special, stable
 from ggxref.measure.doubledouble import cos_sin_turn
 from ggxref.measure.reference import REFERENCES
 from ggxref.measure.variants.form import Variant
@@ -20,7 +20,7 @@ def exact_turn(x):
 
 
 def turn_ours(x):
-    return jnp.stack(stable.cos_sin_turn(x))
+    return jnp.stack(_special.cos_sin_turn(x))
 
 
 def turn_library(x):
@@ -29,7 +29,7 @@ def turn_library(x):
 
 def _polynomial(terms):
     """Taylor polynomials with so many terms each, on an eighth of a turn."""
-    return lambda x: jnp.stack(stable.cos_sin_turn(x, terms))
+    return lambda x: jnp.stack(_special.cos_sin_turn(x, terms))
 
 
 def _unit(x, y, z):
@@ -69,7 +69,7 @@ def cross_section_printed(u, wi, alpha):
 
 
 TURN = (
-    Variant("polynomial", "ggxref.stable.cos_sin_turn", turn_ours),
+    Variant("polynomial", "ggxref._special.cos_sin_turn", turn_ours),
     Variant("library", "cos and sin of 2πu in the working precision", turn_library),
     Variant("4 terms", "Taylor, x⁷ and x⁶", _polynomial(4)),
     Variant("3 terms", "Taylor, x⁵ and x⁴", _polynomial(3)),
