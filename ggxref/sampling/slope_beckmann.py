@@ -10,7 +10,8 @@ from jax.scipy.special import erfc
 
 from ggxref import _special, stable
 from ggxref._types import Scalar, Vec2, Vec3
-from ggxref.sampling._sphere import incident, unstretch
+from ggxref.ellipsoid import reciprocal_scale
+from ggxref.sampling._sphere import unstretch
 from ggxref.sampling._visible import pdf_beckmann as pdf
 
 __all__ = ["pdf", "sample"]
@@ -18,31 +19,18 @@ __all__ = ["pdf", "sample"]
 _DENSITY = 2 / math.sqrt(math.pi)
 
 
-def _shares(a, s, c, edge_area):
-    r"""The logarithms of $\frac{2}{\sqrt\pi}\int (s a' + c) e^{-a'^2} da'$ over (a, ∞[, for a >= 0, and from the edge −c/s
-    to a, for a <= 0; each with the density at a over the integral."""
-    tail, tail_integral = _special.gaussian_tails(jnp.abs(a))
-    height, tiny = s * a + c, jnp.finfo(a.dtype).tiny
-    above = jnp.maximum(s * tail_integral + height * tail, tiny)
-    gauss = jnp.exp(-a * a)
-    below = jnp.maximum((height * tail - s * tail_integral) * gauss + edge_area, tiny)
-    return (jnp.log(above) - a * a, _DENSITY * height / above), (jnp.log(below), _DENSITY * height * gauss / below)
-
-
 # Gauss–Legendre on [0, 1]: exact to the last bit for the smooth integrand below.
-_X, _W = np.polynomial.legendre.leggauss(10)
-_NODES, _WEIGHTS = 0.5 + 0.5 * _X, 0.5 * _W
+_NODES = {jnp.dtype(d): np.polynomial.legendre.leggauss(n) for d, n in (("float32", 6), ("float64", 10))}
 
 
-def _near_edge(a, s, edge):
-    """The same integral close to the edge, where it is second order and every difference of its end values cancels."""
-    d = a + edge
+def _near_edge(d, edge):
+    r"""$\int_0^1 t\,e^{t d (2 e - t d)}\,dt$: d² times it, the density's integral from its edge, of which it is second order
+    there and every difference of end values cancels."""
+    nodes, weights = _NODES[d.dtype]
+    t = (1 + nodes) / 2
     # As one sum over an array: ten terms are ten pieces to the compiler.
-    x = jnp.asarray(_NODES, d.dtype) * d[..., None]
-    total = jnp.sum(jnp.asarray(_NODES * _WEIGHTS, d.dtype) * jnp.exp(x * (2 * edge[..., None] - x)), -1)
-    logarithm = jnp.log(jnp.maximum(d, jnp.finfo(d.dtype).tiny))
-    ratio = jnp.exp(d * (2 * edge - d)) / (total * jnp.where(d > 0, d, 1))
-    return 2 * logarithm + jnp.log(_DENSITY * s * total) - edge * edge, ratio
+    x = jnp.asarray(t, d.dtype) * d[..., None]
+    return jnp.sum(jnp.asarray(t * weights / 2, d.dtype) * jnp.exp(x * ((edge[..., None] - x) + edge[..., None])), -1)
 
 
 def _root(residual: Callable, lower, upper, start):
@@ -65,44 +53,41 @@ def _quantile(u: Scalar, s: Scalar, c: Scalar) -> Scalar:
     r"""The `a` above which lies the share `u` of the density $\propto \max(0, s a + c) e^{-a^2}$, for `u > 0`: (11) with $a = -\tilde x$.
 
     The integral is taken from the nearer end, and its logarithm matched: both ends are log-concave, where Newton's
-    steps converge from afar.
+    steps converge from afar. Integrals are of $\frac{2}{\sqrt\pi}(s a + c) e^{f^2-a^2}$ with `f` where the density starts,
+    if it starts above 0: that far below the horizon the exponential itself underflows.
     """
     tiny = jnp.finfo(s.dtype).tiny
     s = jnp.maximum(s, tiny)
-    edge = jnp.minimum(c / s, 1 / math.sqrt(tiny))
-    floor = jnp.maximum(-edge, 0)  # where the density starts, if it starts above 0
-    _, edge_integral = _special.gaussian_tails(jnp.abs(edge))
-    edge_area = s * edge_integral * jnp.exp(-edge * edge)
-    # Below the horizon the whole density is this one tail; the logarithm outlives its underflow.
-    log_total = jnp.where(
-        c > 0,
-        jnp.log(2 * jnp.maximum(c, 0) + edge_area),
-        jnp.log(s * edge_integral) - edge * edge,
-    )
+    edge = jnp.minimum(c / s, 1 / math.sqrt(tiny))  # the density starts at -edge
+    floor, gauss_edge = jnp.maximum(-edge, 0), jnp.exp(-jnp.square(jnp.maximum(edge, 0)))
+    edge_area = s * _special.gaussian_tails(jnp.abs(edge))[1] * gauss_edge
+    total = 2 * jnp.maximum(c, 0) + edge_area
 
     u = jnp.maximum(u, tiny)
-    w = jnp.minimum(u, 1 - u)  # the nearer share
-    log_target = jnp.log(w) + log_total
-    reach = jnp.sqrt(-jnp.log(w))
-
-    top = u <= 0.5
+    w, top = jnp.minimum(u, 1 - u), u <= 0.5  # the nearer share
+    log_w = jnp.log(w)
+    log_target, reach = log_w + jnp.log(total), jnp.sqrt(-log_w)
 
     def residual(a):
-        (survival, ratio), (lower, lower_ratio) = _shares(a, s, c, edge_area)
-        # From below: for a > 0 it is the rest of the survival, of which it is then at least a tenth.
-        part = -jnp.expm1(jnp.minimum(survival - log_total, -tiny))
-        part = jnp.maximum(part, tiny)
-        upper, upper_ratio = log_total + jnp.log(part), ratio * jnp.exp(survival - log_total) / part
-        value, slope = jnp.where(a > 0, upper, lower), jnp.where(a > 0, upper_ratio, lower_ratio)
-        close = (a + edge) * (1 + jnp.abs(edge)) < 1
-        first, first_ratio = _near_edge(jnp.where(close, a, -edge), s, edge)
-        value, slope = jnp.where(close, first, value), jnp.where(close, first_ratio, slope)
-        return jnp.where(top, log_target - survival, value - log_target), jnp.where(top, ratio, slope)
+        tail, integral = _special.gaussian_tails(jnp.abs(a))
+        height, d = s * a + c, a + edge
+        exponent = (floor - a) * (floor + a)
+        gauss = jnp.exp(exponent)
+        above = s * integral + height * tail  # for a > 0, over gauss
+        # From below: for a > 0 it is the rest of the total, of which it is then at least a tenth.
+        below = jnp.where(a > 0, total - above * gauss, (height * tail - s * integral) * gauss + edge_area)
+        close = jnp.where(top, False, d + jnp.abs(d * edge) < 1)
+        d = jnp.where(close, d, 0)
+        part = jnp.where(close, _DENSITY * (d * (d * (s * (_near_edge(d, edge) * gauss_edge)))), below)
+        part = jnp.maximum(jnp.where(top, above, part), tiny)
+        density = _DENSITY * (jnp.where(close, s * d, height) * jnp.where(top, 1, gauss))
+        value = jnp.log(part) - log_target
+        return jnp.where(top, -exponent - value, value), density / part
 
     bottom = jnp.maximum(-edge, -reach)
     spread = 1 / (1 + floor)  # the median lies within twice this of the floor
-    # The integral starts as s (a + edge)² exp(−edge²)/√π: from its root on, the steps do not leave the bracket.
-    rise = jnp.exp(jnp.minimum((log_target + edge * edge - jnp.log(s / math.sqrt(math.pi))) / 2, 0.0))
+    # The integral starts as gauss_edge s (a + edge)²/√π: from its root on, the steps do not leave the bracket.
+    rise = jnp.exp(jnp.minimum((log_target - jnp.log(s * gauss_edge / math.sqrt(math.pi))) / 2, 0.0))
     start = jnp.minimum(jnp.maximum(rise - edge, bottom), (bottom + floor) / 2 + spread / 2)
     furthest = floor + reach
     lower, upper = jnp.where(top, floor, bottom), jnp.where(top, furthest, floor + 2 * spread)
@@ -124,6 +109,7 @@ def _quantile_jvp(primals, tangents):
     return a, jnp.where(density > 0, change / jnp.where(density > 0, density, 1), 0)
 
 
+@stable.widened
 def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
     r"""Draw the slope along `wi` from its marginal, the slope across from its conditional; rotate and unstretch.
 
@@ -137,14 +123,22 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
 
     heitz2014 (10)–(13), algorithm 4.
     """
-    i = incident(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
+    x, y, z = stable.turning(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
+    # The law does not depend on their scale.
+    s = stable.sqrt(x * x + y * y)
+    scale = reciprocal_scale(jnp.maximum(s, jnp.abs(z)))
     # Both slopes by one call: the second is the same law at θ = 0.
-    sin = jnp.stack([stable.sqrt(i.x * i.x + i.y * i.y), jnp.zeros_like(i.z)])
-    cos = jnp.stack([i.z, jnp.ones_like(i.z)])
+    first = jnp.asarray([1.0, 0.0], s.dtype)
+    sin, cos = first * (s * scale), jnp.where(first > 0, z * scale, 1)
     along, across = jax.vmap(_quantile)(u, sin, cos)
     horizontal = (u[0] == 0) | (u[1] == 0)
-    x = jnp.where(horizontal, (u[0] == 0).astype(along.dtype), along)
-    y = jnp.where(horizontal, (u[1] == 0).astype(along.dtype), across)
-    cos_i, sin_i = stable.azimuth(i.x, i.y)
+    along = jnp.where(horizontal, (u[0] == 0).astype(s.dtype), along)
+    across = jnp.where(horizontal, (u[1] == 0).astype(s.dtype), across)
+    cos_i, sin_i = stable.azimuth(x, y)
     # `along` and `across` are the negated slopes, which are the normal's own components.
-    return unstretch(cos_i * x - sin_i * y, sin_i * x + cos_i * y, jnp.where(horizontal, 0, 1).astype(x.dtype), alpha)
+    return unstretch(
+        cos_i * along - sin_i * across,
+        sin_i * along + cos_i * across,
+        jnp.where(horizontal, 0, 1).astype(s.dtype),
+        alpha,
+    )
