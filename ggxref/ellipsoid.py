@@ -37,9 +37,10 @@ def cofactor(A: Mat3) -> tuple[Mat3, Scalar]:
     The rows of a smooth or skewed `A` are nearly parallel: plain minors would lose the digits that they share, once each,
     and the determinant twice.
     """
-    minors = _pairs.cofactor(A)
-    det = _pairs.rounded(_pairs.dot_of_pairs(minors[0], tuple(A[0])))
-    return jnp.stack([jnp.stack([_pairs.rounded(p) for p in row]) for row in minors]), det
+    # As one array: nine expressions are nine pieces to the compiler.
+    around = jnp.tile(A, (2, 2))
+    (a, b), (c, d) = ([around[i : i + 3, j : j + 3] for j in (1, 2)] for i in (1, 2))
+    return stable.dot((a, b), (d, -c)), determinant(A)
 
 
 @stable.widened
