@@ -54,6 +54,11 @@ def perturbed(x: Any, step: arb) -> Iterator[Any]:
             yield (*x[:i], changed, *x[i + 1 :])
 
 
+def moved(x: Any, way: Any, step: arb) -> Any:
+    """The input, `step` along a way of its own shape."""
+    return tuple(moved(a, b, step) for a, b in zip(x, way, strict=True)) if isinstance(x, tuple) else x + step * way
+
+
 def largest(values: list[arb]) -> float:
     return max(abs(float(v.mid())) for v in values)
 

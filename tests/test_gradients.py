@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from exact import BITS, STEP, leaves
+from exact import BITS, STEP, leaves, moved
 from flint import arb
 from library import gradient, numbers, over_rows, public
 from points import FUNCTIONS, points
@@ -49,8 +49,8 @@ def quotient(name: str, inputs, changes) -> tuple[float, float]:
     function = lookup(name)
 
     def combined(sign):
-        moved = {a: moved_by(exact(x), exact(changes[a]), sign * STEP) for a, x in inputs.items()}
-        result = function(**moved)
+        there = {a: moved(exact(x), exact(changes[a]), sign * STEP) for a, x in inputs.items()}
+        result = function(**there)
         parts = result if name.endswith("to_slopes") else (result,)
         if "rejection" in name:
             parts = result[:1]  # the other counts the tries
@@ -60,10 +60,6 @@ def quotient(name: str, inputs, changes) -> tuple[float, float]:
         return float(((combined(1) - combined(-1)) / (2 * STEP)).mid()), float(combined(0).mid())
 
     return raised(both, BITS, name, inputs)
-
-
-def moved_by(x, d, step):
-    return tuple(moved_by(a, b, step) for a, b in zip(x, d, strict=True)) if isinstance(x, tuple) else x + step * d
 
 
 def errors(function, name: str, count: int) -> list[float]:
