@@ -156,12 +156,11 @@ def test_a_small_wrong_term_is_caught():
         return fresnel.schlick(cos_i, f0)
 
     @wrong.defjvp
-    def _(primals, tangents):
+    def rule(primals, tangents):
         value, change = jax.jvp(fresnel.schlick, primals, tangents)
         return value, change + 1e-8 * primals[1] * tangents[1]
 
-    once, _ = errors("fresnel.schlick", wrong)
-    assert FIRST < once < 1e-6
+    assert FIRST < errors("fresnel.schlick", wrong)[0] < 1e-6
 
 
 def test_a_derivative_held_constant_is_caught():
@@ -172,11 +171,9 @@ def test_a_derivative_held_constant_is_caught():
         return fresnel.schlick(cos_i, f0)
 
     @held.defjvp
-    def _(primals, tangents):
-        slopes = jax.grad(fresnel.schlick, (0, 1))(*primals)
-        return fresnel.schlick(*primals), sum(
-            jax.lax.stop_gradient(s) * t for s, t in zip(slopes, tangents, strict=True)
-        )
+    def rule(primals, tangents):
+        by_c, by_f0 = jax.lax.stop_gradient(jax.grad(fresnel.schlick, (0, 1))(*primals))
+        return fresnel.schlick(*primals), jnp.asarray(by_c * tangents[0] + by_f0 * tangents[1])
 
     once, twice = errors("fresnel.schlick", held)
     assert once < FIRST and twice == 1
