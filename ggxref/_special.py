@@ -4,7 +4,9 @@ import math
 
 import jax
 import jax.numpy as jnp
+from jax import lax
 
+from ggxref._errorfree import two_product
 from ggxref._types import Real, Scalar
 
 
@@ -82,14 +84,18 @@ _IERFC = (
 )
 
 
+def _chebyshev(coefficients, t):
+    """The series at `t` in [-1, 1], by Clenshaw's recurrence."""
+    b, b_next = coefficients[-1] + jnp.zeros_like(t), jnp.zeros_like(t)
+    for c in reversed(coefficients[1:-1]):
+        b, b_next = c + 2 * t * b - b_next, b
+    return coefficients[0] + t * b - b_next
+
+
 def _ierfc_scaled(a):
     """exp(a²) ierfc(a) for a >= 0."""
-    coefficients = _IERFC if a.dtype == jnp.float64 else _IERFC[:16]
-    t = (a - 3) / (a + 3)
-    b, b_next = jnp.zeros_like(t), jnp.zeros_like(t)
-    for c in reversed(coefficients[1:]):  # Clenshaw
-        b, b_next = c + 2 * t * b - b_next, b
-    return (coefficients[0] + t * b - b_next) / (math.sqrt(math.pi) * (1 + 2 * a * a))
+    series = _chebyshev(_IERFC if a.dtype == jnp.float64 else _IERFC[:16], (a - 3) / (a + 3))
+    return series / (math.sqrt(math.pi) * (1 + 2 * a * a))
 
 
 @jax.custom_jvp
@@ -127,12 +133,81 @@ def gaussian_tails(a: Real) -> tuple[Scalar, Scalar]:
     return jnp.where(small, direct, (1 / math.sqrt(math.pi) - scaled) / jnp.where(small, 1, a)), scaled
 
 
-def _x_minus_sin(x):
-    """x − sin x for 0 <= x <= pi, without the cancellation at 0."""
-    square = x * x
-    # x^3/3! - x^5/5! + ...: where it is used (x < 1.5), 13 terms reach the last bit of float64.
-    series = _horner([(-1) ** k / math.factorial(2 * k + 3) for k in range(13)], square)
-    return jnp.where(x < 1.5, x * square * series, x - jnp.sin(x))
+# Chebyshev coefficients of E/4π over w = v^(1/3), in 8 w² − 1, and of (π − E)/4π over d = 1/2 − v, in 128 d²/9 − 1: E of
+# `kepler`, up to v = 1/8 and from there on. tests/test_stable.py computes them again with arb.
+_KEPLER_NEAR = (
+    0.27373137601720254,
+    0.007135259045858628,
+    0.00024371797026280213,
+    1.0855022415556047e-05,
+    5.481501206835336e-07,
+    2.978469451636786e-08,
+    1.6980439530995776e-09,
+    1.0014660759912268e-10,
+    6.057314463054036e-12,
+    3.735866874587357e-13,
+    2.3401426544559826e-14,
+    1.4845159694774116e-15,
+    9.516738185171933e-17,
+)
+_KEPLER_FAR = (
+    0.26887894686018443,
+    0.020660468553657853,
+    0.002002799141877438,
+    0.0002526200015789652,
+    3.613616561824433e-05,
+    5.564513787932918e-06,
+    8.993386696716911e-07,
+    1.5040441726102928e-07,
+    2.5800911710162963e-08,
+    4.5137433332609895e-09,
+    8.02091179414251e-10,
+    1.4435679356584195e-10,
+    2.625662276966304e-11,
+    4.818482423580063e-12,
+    8.910240037646088e-13,
+    1.6585487164549058e-13,
+    3.105016650813989e-14,
+    5.84249781510308e-15,
+    1.1042933395719963e-15,
+    2.095624866272094e-16,
+    3.991253708041466e-17,
+    7.626422005656268e-18,
+)
+
+# The bits of 1/∛x are these less a third of those of x, to within 4 %.
+_CBRT = {jnp.dtype("float32"): (jnp.int32, 0x54A2328C, 2), jnp.dtype("float64"): (jnp.int64, 0x553EF0FF289DD796, 3)}
+
+
+def _fast_two_sum(a, b):
+    """As `two_sum`, where `a` is the larger one (Dekker 1971)."""
+    total = a + b
+    return total, b - (total - a)
+
+
+def _cbrt(x):
+    r"""$\sqrt[3]x$ for 0 <= x <= 1, and what its rounding left out: XLA's is a power."""
+    integer, magic, steps = _CBRT[x.dtype]
+    small = x < 2.0**-60  # whose products would be subnormal
+    x, scale = jnp.where(small, x * 2.0**60, x), jnp.where(small, 2.0**-20, 1).astype(x.dtype)
+    third = (lax.bitcast_convert_type(x, integer).astype(x.dtype) / 3).astype(integer)
+    inverse = lax.bitcast_convert_type(integer(magic) - third, x.dtype)
+    for _ in range(steps):
+        inverse = inverse * (4 - x * inverse * inverse * inverse) / 3
+    square, square_rest = two_product(inverse, inverse)
+    root, rest = two_product(x, square)
+    product, product_rest = two_product(root, inverse)
+    # x inverse³ is 1 but for three times the error of the inverse.
+    off = (1 - product) - (product_rest + (rest + x * square_rest) * inverse)
+    return _fast_two_sum(root * scale, (rest + x * square_rest + root * off * (2 / 3)) * scale)
+
+
+def _odd(series, x, rest, t):
+    """`x` times the series at `t`, of which all but the first coefficient are small, in two words."""
+    first = x.dtype.type(series[0])
+    value, error = two_product(x, jnp.asarray(first))
+    others = _chebyshev((series[0] - float(first), *series[1:]), t)
+    return _fast_two_sum(value, x * others + (rest * series[0] + error))
 
 
 @jax.custom_jvp
@@ -140,23 +215,19 @@ def kepler(v: Real) -> tuple[Scalar, Scalar]:
     r"""$(\cos\frac E2, \sin\frac E2)$ for the root E in [0, π] of $E - \sin E = 2\pi v$, `v` in [0, 1/2]: Kepler's equation at
     eccentricity 1.
 
-    E/2 is the angle that cuts the fraction `v` of a disk's area, so this inverts the marginal of a uniform disk.
+    E/2 is the angle that cuts the fraction `v` of a disk's area, so this inverts the marginal of a uniform disk. E is an odd
+    function of the cube root of `v`, π − E one of 1/2 − v; the cosine takes its digits from the latter.
     """
     v = jnp.asarray(v)
-    target = (2 * math.pi) * v
-    # E ~ (6 target)^(1/3) for small targets, and within 16 % of the root everywhere: Halley's third step is exact.
-    E = jnp.cbrt(6 * target)
-    for _ in range(4):
-        f = _x_minus_sin(E) - target
-        slope = 2 * jnp.sin(E / 2) ** 2
-        slope = jnp.where(slope > 0, slope, 1)
-        step = f / slope
-        E = E - step / (1 - 0.5 * step * (jnp.sin(E) / slope))
-    # Towards 1/2 the cosine has the digits of π − E, the root of x + sin x = π − 2πv: one step of Newton's.
-    x = math.pi - E
-    x = x - (x + jnp.sin(x) - (2 * math.pi) * (0.5 - v)) / (1 + jnp.cos(jnp.minimum(x, 2)))
-    far = v > 0.25
-    return jnp.where(far, jnp.sin(x / 2), jnp.cos(E / 2)), jnp.where(far, jnp.cos(x / 2), jnp.sin(E / 2))
+    near, far = (_KEPLER_NEAR, _KEPLER_FAR) if v.dtype == jnp.float64 else (_KEPLER_NEAR[:7], _KEPLER_FAR[:11])
+    upper = v > 0.125
+    (w, w_rest), d = _cbrt(jnp.where(upper, 0, v)), 0.5 - v
+    angles = _odd(near, w, w_rest, 8 * w * w - 1), _odd(far, d, 0.0, (128 / 9) * d * d - 1)
+    angle, rest = (jnp.where(upper, y, x) for x, y in zip(*angles, strict=True))
+    c, s = cos_sin_turn(angle)
+    rest = (2 * math.pi) * rest
+    c, s = c - s * rest, s + c * rest
+    return jnp.where(upper, s, c), jnp.where(upper, c, s)
 
 
 @kepler.defjvp

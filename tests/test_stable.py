@@ -228,22 +228,25 @@ def scaled_ierfc(a: arb) -> arb:
     return 1 / arb.pi().sqrt() - a * (a * a).exp() * a.erfc()
 
 
+def chebyshev(function, count: int, nodes: int = 96) -> list[float]:
+    """Coefficients of the series of a smooth function on [-1, 1], by the discrete cosine transform."""
+    angles = [(arb(2 * k + 1) / (2 * nodes)) for k in range(nodes)]
+    values = [function(angle.cos_pi()) for angle in angles]
+    sums = (sum((y * (j * a).cos_pi() for y, a in zip(values, angles, strict=True)), arb(0)) for j in range(count))
+    return [float((s * (1 if j == 0 else 2) / nodes).mid()) for j, s in enumerate(sums)]
+
+
 def test_ierfc_coefficients():
-    """The Chebyshev series of √π (1 + 2a²) exp(a²) ierfc(a) in t = (a − 3)/(a + 3), by the discrete cosine transform."""
-    nodes = 96
+    """The Chebyshev series of √π (1 + 2a²) exp(a²) ierfc(a) in t = (a − 3)/(a + 3)."""
+
+    def function(t):
+        a = 3 * (1 + t) / (1 - t)
+        return arb.pi().sqrt() * (1 + 2 * a * a) * scaled_ierfc(a)
+
     with working(400):
-        angles = [(arb(2 * k + 1) / (2 * nodes)) for k in range(nodes)]
-        t = [angle.cos_pi() for angle in angles]
-        a = [3 * (1 + x) / (1 - x) for x in t]
-        f = [arb.pi().sqrt() * (1 + 2 * x * x) * scaled_ierfc(x) for x in a]
-        true = [
-            sum((y * (j * angle).cos_pi() for y, angle in zip(f, angles, strict=True)), arb(0))
-            * (1 if j == 0 else 2)
-            / nodes
-            for j in range(len(_special._IERFC) + 1)
-        ]
-    np.testing.assert_allclose(_special._IERFC, [float(c.mid()) for c in true[:-1]], rtol=1e-15, atol=1e-19)
-    assert abs(float(true[-1].mid())) < 2**-53  # the first one left out
+        *true, first_left_out = chebyshev(function, len(_special._IERFC) + 1)
+    np.testing.assert_allclose(_special._IERFC, true, rtol=1e-15, atol=1e-19)
+    assert abs(first_left_out) < 2**-53
 
 
 def test_ierfc(dtype):
@@ -263,11 +266,37 @@ def test_gaussian_tails(dtype):
     assert ulps(1 / np.sqrt(np.pi).astype(dtype) - a * np.asarray(tail), true, dtype) > 1e3
 
 
+def eccentric_anomaly(v: arb) -> arb:
+    """The root E of E − sin E = 2πv."""
+    E = arb((12 * np.pi * float(v.mid())) ** (1 / 3))
+    for _ in range(12):
+        E = (E - (E - E.sin() - 2 * arb.pi() * v) / (1 - E.cos())).mid()
+    return E
+
+
+def test_kepler_coefficients():
+    """The Chebyshev series of the two odd functions, of v^(1/3) up to 1/2 and of 1/2 − v up to 3/8, over their argument."""
+
+    def near(t):
+        w = ((1 + t) / 8).sqrt()
+        return eccentric_anomaly((w**3).mid()) / (4 * arb.pi() * w)
+
+    def far(t):
+        d = (9 * (1 + t) / 128).sqrt()
+        return (arb.pi() - eccentric_anomaly((arb(1) / 2 - d).mid())) / (4 * arb.pi() * d)
+
+    for function, table in ((near, _special._KEPLER_NEAR), (far, _special._KEPLER_FAR)):
+        with working(400):
+            *true, first_left_out = chebyshev(function, len(table) + 1, 64)
+        np.testing.assert_allclose(table, true, rtol=1e-15, atol=1e-19)
+        assert abs(first_left_out) < 2**-53 * table[0]
+
+
 def test_kepler(dtype):
     """E − sin E = 2πv; both sides vanish as E³/6, and cos E/2 at v = 1/2, where plain differences would be 0."""
     v = np.exp(rng().uniform(-30, np.log(0.5), N))
     v[::2] = 0.5 - v[::2] / 1.01
-    v = v.astype(dtype)
+    v = np.concatenate([v, np.exp(rng().uniform(-80, -30, 64))]).astype(dtype)
     c, s = jax.jit(jax.vmap(_special.kepler))(v)
 
     def corrected(c, s, v):  # Newton's step from the result is its error

@@ -11,6 +11,7 @@ from ggxref.sampling._visible import pdf_ggx as pdf
 __all__ = ["pdf", "sample"]
 
 
+@stable.widened
 def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
     r"""Draw the slope along `wi` from its marginal, the slope across from its conditional; rotate and unstretch.
 
