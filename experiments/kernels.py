@@ -23,7 +23,7 @@ from ggxref.measure.accuracy import measure
 from ggxref.measure.reference import REFERENCES
 from ggxref.measure.regions import REGIONS
 from ggxref.measure.variants import QUANTITIES
-from ggxref.measure.variants.directions import cap_along
+from ggxref.measure.variants.directions import cap_uncorrected
 from ggxref.sampling import bounded_cap, cross_section, spherical_cap
 from ggxref.sampling._sphere import half_in_cap, ray
 
@@ -45,7 +45,7 @@ GROUPS = (
         "spherical_cap.sample": (spherical_cap.sample, "mitsuba sample", "sampling.spherical_cap.sample"),
         PACKED: (spherical_cap.sample, "mitsuba sample", "sampling.spherical_cap.sample"),
         "the same, a loop for each component": (cap_apart, "mitsuba sample", "sampling.spherical_cap.sample"),
-        "the same, along the azimuth": (cap_along, "mitsuba sample", "sampling.spherical_cap.sample"),
+        "the same, plain sum": (cap_uncorrected, "mitsuba sample", "sampling.spherical_cap.sample"),
         "bounded_cap.sample": (bounded_cap.sample, "mitsuba sample", "sampling.bounded_cap.sample"),
         "cross_section.sample": (cross_section.sample, "mitsuba sample", "sampling.cross_section.sample"),
     },

@@ -4,6 +4,7 @@ import math
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import lax
 
 from ggxref._errorfree import two_product
@@ -19,6 +20,7 @@ def log1p(x: Scalar) -> Scalar:
 # Taylor coefficients of sin 2πv / v and cos 2πv in v²: on |v| <= 1/8 the first term left out is below half an ulp.
 _SIN = [(-1) ** k * (2 * math.pi) ** (2 * k + 1) / math.factorial(2 * k + 1) for k in range(9)]
 _COS = [(-1) ** k * (2 * math.pi) ** (2 * k) / math.factorial(2 * k) for k in range(9)]
+_TAU_REST = 2.4492935982947064e-16  # of 2π, beyond its float64
 
 
 def _horner(coefficients, x):
@@ -41,7 +43,11 @@ def cos_sin_turn(u: Real, terms: int | None = None) -> tuple[Scalar, Scalar]:
     quarter = jnp.round(4 * u)
     v = u - quarter / 4
     square = v * v
-    c, s = _horner(_COS[:cos_terms], square), v * _horner(_SIN[:sin_terms], square)
+    # 2π in two words: its rounding is as large as all others of the sine.
+    tau = float(np.asarray(math.tau).astype(u.dtype))
+    rest = (math.tau - tau) + _TAU_REST
+    c = _horner(_COS[:cos_terms], square)
+    s = v * tau + v * (rest + square * _horner(_SIN[1:sin_terms], square))
     swap = (quarter == 1) | (quarter == 3)
     c, s = jnp.where(swap, s, c), jnp.where(swap, c, s)
     negate_cos, negate_sin = (quarter == 1) | (quarter == 2), (quarter == 2) | (quarter == 3)

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import jax.numpy as jnp
+from jax import lax
 
 from ggxref import _special, stable
 from ggxref._types import Real, Scalar, Turn, Vec2, Vec3
@@ -14,27 +15,27 @@ class Incident(NamedTuple):
     x: Scalar
     y: Scalar
     z: Scalar
-    norm: Scalar  # its length before it was normalised
     rise: Scalar  # 1 + z
     fall: Scalar  # 1 - z
 
 
+def ray_factor(x: Scalar, y: Scalar, z: Scalar) -> Scalar:
+    """The factor of `ray`."""
+    return stable.sqrt(x * x + y * y + z * z) + jnp.abs(z)
+
+
 def ray(x: Scalar, y: Scalar, z: Scalar) -> Incident:
-    """`incident` times a positive factor, ‖(x, y, z)‖ + |z|: a half vector needs no more, and no division is left."""
+    """`incident` times a positive number, ‖v‖ (‖v‖ + |z|) of v = (x, y, z): a half vector needs no more, and no division is left."""
     x, y, z = stable.turning(x, y, z)
-    square = x * x + y * y
-    norm = stable.sqrt(square + z * z)
-    below = z < 0
-    factor = norm + jnp.abs(z)
-    # (norm + |z|) factor and (norm - |z|) factor, the latter without its cancellation.
-    large, small = factor * factor, square
+    factor, below = ray_factor(x, y, z), z < 0
+    # (‖v‖ + |z|) factor and (‖v‖ - |z|) factor, the latter without its cancellation.
+    large, small = factor * factor, x * x + y * y
     rise, fall = jnp.where(below, small, large), jnp.where(below, large, small)
-    return Incident(factor * x, factor * y, factor * z, norm, rise, fall)
+    return Incident(factor * x, factor * y, factor * z, rise, fall)
 
 
 def incident(x: Scalar, y: Scalar, z: Scalar) -> Incident:
     """The sphere-space direction along `(x, y, z)`, which need not be unit."""
-    length = stable.sqrt(x * x + y * y + z * z)
     x, y, z = stable.turning(x, y, z)
     square = x * x + y * y
     norm = stable.sqrt(square + z * z)
@@ -44,21 +45,48 @@ def incident(x: Scalar, y: Scalar, z: Scalar) -> Incident:
     large = norm + jnp.abs(z)
     small = square / large
     rise, fall = jnp.where(below, small, large) / norm, jnp.where(below, large, small) / norm
-    return Incident(x / norm, y / norm, z / norm, length, rise, fall)
+    return Incident(x / norm, y / norm, z / norm, rise, fall)
 
 
-def half_in_cap(u: Vec2, i: Incident, cut: Real, turn: Turn = _special.cos_sin_turn) -> tuple[Scalar, Scalar, Scalar]:
-    """`i + c` (not normalised) with `c` uniform on the cap `{z > cut - i.z}`, all in units of i's length.
+class Sum(NamedTuple):
+    """`i + c`, and what its correction needs."""
+
+    x: Scalar
+    y: Scalar
+    z: Scalar
+    climb: Scalar  # c.z - i.z
+    square: Scalar  # c.x² + c.y²
+
+
+def sum_in_cap(u: Vec2, i: Incident, cut: Real, turn: Turn = _special.cos_sin_turn) -> Sum:
+    """`i + c` with `c` uniform on the cap `{z > cut - i.z}`, all in units of i's length.
 
     `cut = 0` is the whole cap of the reflections of the hemisphere (dupuy2023 listing 3); tokuyoshi2024's is
-    `(1 - k) i.z`. The cap's height `1 + i.z - cut`, its complement to 2 and `c.z + i.z` are all formed without
+    `(1 - k) i.z`. The cap's height `1 + i.z - cut` and `c.z + i.z` are formed without
     cancellation, so that half vectors keep z > 0 for every `u` in [0, 1).
     """
     cos_phi, sin_phi = turn(u[0])
-    height, rest = i.rise - cut, i.fall + cut
+    height = i.rise - cut
     depth = u[1] * height  # 1 - c.z
-    sin_theta = stable.sqrt(depth * ((1 - u[1]) * (i.rise + i.fall) + u[1] * rest))
-    return sin_theta * cos_phi + i.x, sin_theta * sin_phi + i.y, (1 - u[1]) * height + cut
+    z = (1 - u[1]) * height + cut
+    # Not depth (fall + z): what shares z with it, XLA cuts off from the loop.
+    square = depth * ((1 - u[1]) * (i.rise + i.fall) + u[1] * (i.fall + cut))
+    sin_theta = stable.sqrt(square)
+    return Sum(sin_theta * cos_phi + i.x, sin_theta * sin_phi + i.y, z, i.fall - depth, square)
+
+
+def half_in_cap(u: Vec2, i: Incident, cut: Real, turn: Turn = _special.cos_sin_turn) -> tuple[Scalar, Scalar, Scalar]:
+    r"""`sum_in_cap`, not normalised, with its digits also where `c` is nearly `-i`, at the rim of the cap of a rough surface.
+
+    As `c` is as long as `i`, their sum and difference are perpendicular: $h\cdot(c - i) = 0$. What is left of that product is
+    the error of the sum's horizontal part along the azimuth, most of what the sum has lost. Its height is exact.
+    """
+    h = sum_in_cap(u, i, cut, turn)
+    x, y = h.x - 2 * i.x, h.y - 2 * i.y  # c - i
+    # Its square by ‖c - i‖² + ‖c + i‖² = 2‖c‖² + 2‖i‖² in the plane: ‖c + i‖² is small wherever a correction matters.
+    square = 2 * (h.square + i.rise * i.fall)
+    over = lax.stop_gradient(stable.crude_quotient(h.x * x + h.y * y + h.z * h.climb, square))
+    return h.x - over * lax.stop_gradient(x), h.y - over * lax.stop_gradient(y), h.z
 
 
 def crescent(along: Scalar, rim: Scalar, i: Incident, sin_theta: Scalar) -> tuple[Scalar, Scalar, Scalar]:

@@ -9,9 +9,9 @@ $o_z' + i_z' \ge i_z/(\|A i\| \max_{\theta\le\theta_1} Q)$. At e = 0 and α ≤ 
 import jax.numpy as jnp
 
 from ggxref import _special, ndf, stable
+from ggxref._seen import area_ggx
 from ggxref._types import Mat3, Scalar, Turn, Vec2, Vec3
 from ggxref.ellipsoid import Canonical, canonical_terms, inverse_square, length, near_one, normal_square
-from ggxref.sampling._half_vector import rise_and_fall
 from ggxref.sampling.ellipsoid_cap import from_sphere, half_vector, to_sphere
 
 
@@ -78,7 +78,8 @@ def pdf(wm: Vec3, wi: Vec3, A: Mat3) -> Scalar:
     """
     A, _ = near_one(A)
     terms = canonical_terms(A)
-    _, rise, _ = rise_and_fall(*to_sphere(wi, terms))
+    one = jnp.ones_like(wi[2])
+    rise = area_ggx(to_sphere(wi, terms), (one, one), 1)
     cosine, cut = stable.cosine(wi, wm), _cut(wi, terms)
     slack = 1 - 64 * float(jnp.finfo(wm.dtype).eps)
     # A is canonical up to a rotation and the factor ‖A n‖.

@@ -4,8 +4,8 @@ import jax.numpy as jnp
 
 from ggxref import _pairs, _special, stable
 from ggxref._types import Mat3, Real, Scalar, Turn, Vec2, Vec3
-from ggxref.ellipsoid import Canonical, canonical_terms, reciprocal_scale
-from ggxref.sampling._half_vector import half_in_cap
+from ggxref.ellipsoid import Canonical, canonical_terms, length, reciprocal_scale
+from ggxref.sampling._sphere import half_in_cap, ray, ray_factor
 from ggxref.sampling._visible import pdf_ellipsoid as pdf
 
 __all__ = ["pdf", "sample"]
@@ -20,11 +20,16 @@ def to_sphere(wi: Vec3, A: Canonical) -> tuple[Scalar, Scalar, Scalar]:
 
 
 def half_vector(u: Vec2, wi: Vec3, A: Canonical, cut: Real, turn: Turn) -> tuple[Scalar, Scalar, Scalar]:
-    """`half_in_cap` about `A wi`, which is as long as α: shortened to about 1, as Aᵀ makes it longer by α once more."""
+    """`half_in_cap` about `A wi`, which is as long as α: shortened to about 1, as Aᵀ makes it longer by α once more.
+
+    - `cut`: in units of the length of `A wi`.
+    """
     i = to_sphere(wi, A)
     scale = reciprocal_scale(jnp.maximum(jnp.maximum(jnp.abs(i[0]), jnp.abs(i[1])), jnp.abs(i[2])))
     x, y, z = (c * scale for c in i)
-    return half_in_cap(u, x, y, z, cut * scale, turn)
+    cut = stable.relative(cut * scale, length(x, y, z))
+    x, y, z = stable.turning(x, y, z)
+    return stable.one_loop(*half_in_cap(u, ray(x, y, z), cut * ray_factor(x, y, z), turn))
 
 
 def from_sphere(x: Scalar, y: Scalar, z: Scalar, A: Canonical) -> Vec3:

@@ -45,7 +45,7 @@ def _frame(wi, A):
     small = sin_product / large * sin_product
     below = cosine < 0
     rise, fall = jnp.where(below, small, large) / product, jnp.where(below, large, small) / product
-    pole = Incident(sin_theta, jnp.zeros_like(sin_theta), cosine / product, norm_a, rise, fall)
+    pole = Incident(sin_theta, jnp.zeros_like(sin_theta), cosine / product, rise, fall)
     return (e1, e2, e3), pole, norm_n
 
 

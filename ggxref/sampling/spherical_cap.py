@@ -4,7 +4,7 @@ import math
 
 import jax.numpy as jnp
 
-from ggxref import _special
+from ggxref import _special, stable
 from ggxref._types import Scalar, Turn, Vec2, Vec3
 from ggxref.ellipsoid import length
 from ggxref.sampling._sphere import half_in_cap, ray, unstretch
@@ -13,6 +13,7 @@ from ggxref.sampling._visible import pdf_ggx as pdf
 __all__ = ["cap_pdf", "pdf", "sample"]
 
 
+@stable.widened
 def sample(u: Vec2, wi: Vec3, alpha: Vec2, *, turn: Turn = _special.cos_sin_turn) -> Vec3:
     """Stretch `wi`, draw a direction of the cap `{z > -z_i}`, take the half vector, unstretch.
 

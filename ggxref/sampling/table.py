@@ -17,6 +17,7 @@ from jax import Array
 
 from ggxref import stable
 from ggxref._types import Scalar, Vec2, Vec3
+from ggxref.ellipsoid import length
 from ggxref.sampling._sphere import incident, unstretch
 
 
@@ -142,10 +143,10 @@ def pdf(wm: Vec3, wi: Vec3, alpha: Vec2, table: Table) -> Scalar:
 
     heitz2014 (6), (7), (8) with the tabulated σ.
     """
-    i = incident(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
-    theta = _inclination(i)
+    stretched = alpha[0] * wi[0], alpha[1] * wi[1], wi[2]
+    theta = _inclination(incident(*stretched))
     last = table.sigma.shape[0] - 1
-    sigma = i.norm * jnp.interp(theta * last, jnp.arange(last + 1), table.sigma).astype(wm.dtype)
+    sigma = length(*stretched) * jnp.interp(theta * last, jnp.arange(last + 1), table.sigma).astype(wm.dtype)
     cosine = stable.cosine(wi, wm)
     seen = (cosine > 0) & (wm[2] > 0) & (wi[2] > 0)
     z = jnp.where(seen, wm[2], 1)

@@ -4,12 +4,12 @@ import math
 
 import jax.numpy as jnp
 
-from ggxref import _special, stable
+from ggxref import _special
 from ggxref.measure.doubledouble import cos_sin_turn
 from ggxref.measure.reference import REFERENCES
 from ggxref.measure.variants.form import Variant
 from ggxref.sampling import cross_section, spherical_cap
-from ggxref.sampling._half_vector import half_in_cap
+from ggxref.sampling._sphere import ray, sum_in_cap, unstretch
 
 exact_cap = REFERENCES["sampling.spherical_cap.sample"]
 exact_cross_section = REFERENCES["sampling.cross_section.sample"]
@@ -37,10 +37,10 @@ def _unit(x, y, z):
     return v / jnp.linalg.norm(v)
 
 
-def cap_along(u, wi, alpha):
-    """By the half vector along and across the azimuth of ω_i, which keeps its digits at the rim of the cap."""
-    x, y, z = half_in_cap(u, alpha[0] * wi[0], alpha[1] * wi[1], wi[2], 0)
-    return stable.direction(alpha[0] * x, alpha[1] * y, z)
+def cap_uncorrected(u, wi, alpha):
+    """The half vector as the plain sum, which loses its digits at the rim of the cap."""
+    h = sum_in_cap(u, ray(alpha[0] * wi[0], alpha[1] * wi[1], wi[2]), 0)
+    return unstretch(h.x, h.y, h.z, alpha)
 
 
 def cap_printed(u, wi, alpha):
@@ -75,8 +75,8 @@ TURN = (
     Variant("3 terms", "Taylor, x⁵ and x⁴", _polynomial(3)),
 )
 CAP = (
-    Variant("no cancellation", "ggxref.sampling.spherical_cap.sample", spherical_cap.sample),
-    Variant("along the azimuth", "the half vector of ggxref.sampling.ellipsoid_cap", cap_along),
+    Variant("perpendicular", "ggxref.sampling.spherical_cap.sample", spherical_cap.sample),
+    Variant("plain sum", "ggxref.sampling.spherical_cap.sample without the correction of o' + i'", cap_uncorrected),
     Variant("printed", "dupuy2023 listing 3", cap_printed),
 )
 CROSS_SECTION = (
