@@ -48,17 +48,21 @@ def _amplitudes(c, eta):
 def _dielectric_jvp(primals, tangents):
     """Of R = (a − b)/(a + b), 2 (b da − a db)/(a + b)²: the difference is simple, its terms are large where c is small.
 
-    By c, those of R_s and R_p add up to a multiple of sin²: what they differ by, V⁴ − (1 − (1 + η²) sin²) U⁴, is expanded about U.
+    By c, those of R_s and R_p add up to a multiple of sin²: what they differ by, V⁴ − (1 − (1 + η²) sin²) U⁴, is expanded about U,
+    unless V is much smaller (η and c are). Divided by V⁴ a factor at a time, which would underflow.
     """
     (cosine, eta), (dc, deta) = primals, tangents
     c = jnp.abs(cosine)
     ct, u, v, fine, r_s, r_p = _amplitudes(c, eta)
-    gap, sin_square = (1 - eta) * (1 + eta), (1 - c) * (1 + c)
-    by_eta = 2 * c / ct * (r_s / u**2 - r_p / v**2 * (1 - 2 * eta**2 * sin_square))
-    d = (eta - 1) * gap / (c + ct)  # V − U = d sin²
-    e = d * (2 * u + sin_square * d)  # V² − U² = e sin²
-    sum_over = (1 + eta**2) * u**4 + e * (2 * u * u + sin_square * e)
-    by_c = -2 * eta * gap * gap * sin_square / ct * (sum_over / (u * v) ** 4)
+    gap, sin_square, ratio, over_v = (1 - eta) * (1 + eta), (1 - c) * (1 + c), v / u, 1 / v
+    by_eta = 2 * c / ct * (r_s / u**2 - r_p * over_v * over_v * (1 - 2 * eta**2 * sin_square))
+    d = (eta - 1) * gap / (c + ct) / u  # V/U − 1 = d sin²
+    e = d * (2 + sin_square * d)  # (V/U)² − 1 = e sin²
+    far = ratio < 0.5
+    apart = (ratio**4 - (c * c - eta**2 * sin_square)) / jnp.where(far, sin_square, 1)
+    rest = jnp.where(far, apart, 1 + eta**2 + e * (2 + sin_square * e))
+    p = gap * over_v
+    by_c = -2 * (eta * over_v) * (sin_square / ct) * (p * rest * p) * over_v
     return _dielectric(*primals), jnp.where(fine, by_c * jnp.sign(cosine), 0) * dc + jnp.where(fine, by_eta, 0) * deta
 
 

@@ -177,3 +177,15 @@ def test_a_derivative_held_constant_is_caught():
 
     once, twice = errors("fresnel.schlick", held)
     assert once < FIRST and twice == 1
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32])
+def test_dielectric_of_a_small_index(dtype):
+    """Where cosine and index are small, V⁴ is 0 in float32, and its expansion about U loses all digits; float64 has them."""
+    eta, shares = np.meshgrid([1e-3, 1e-2, 0.1] if dtype == np.float16 else [1e-12, 1e-6, 1e-2], [0.0, 0.3, 0.9, 4.0])
+    args = [(eta * shares).ravel().astype(dtype), eta.ravel().astype(dtype)]
+    slopes = jax.jit(jax.vmap(jax.grad(fresnel.dielectric, (0, 1))))
+    found = np.array(slopes(*args), np.float64)
+    with jax.enable_x64(True):
+        expected = np.array(slopes(*(a.astype(np.float64) for a in args)))
+    np.testing.assert_allclose(found, expected, rtol=2e-3 if dtype == np.float16 else 1e-5)

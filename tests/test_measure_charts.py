@@ -2,7 +2,9 @@
 
 import csv
 import json
+import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
@@ -80,6 +82,27 @@ def test_a_chart_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
     with open(tmp_path / "stability.csv") as file:
         assert len(list(csv.DictReader(file))) == 16
     assert (tmp_path / "stability.png").read_bytes().startswith(b"\x89PNG")
+
+
+def _after(path, k):
+    """A piece that ends when that file is there."""
+    end = time.monotonic() + 60  # of a busy machine that starts a process
+    while not path.exists() and time.monotonic() < end:
+        time.sleep(0.01)
+    return [{"k": k, "others": path.exists()}]
+
+
+def test_pieces_are_kept_as_they_end_and_read_in_their_order(tmp_path, monkeypatch):
+    """In two processes: the first piece waits for the last, the last for the second."""
+    folder = tmp_path / ".pieces" / "stability-16"
+    waits = {"a": folder / "c.json", "b": tmp_path, "c": folder / "b.json"}
+    pieces = {name: partial(_after, path, name) for name, path in waits.items()}
+    monkeypatch.setitem(tables.KINDS, "stability", lambda points: pieces)
+    ticks = []
+    rows = run.collect("stability", tmp_path, 16, 2, ticks.append)
+    assert rows == [{"k": k, "others": True} for k in "abc"]
+    assert sum(ticks) == 3
+    assert rows == run.collect("stability", tmp_path, 16, 2, ticks.append)  # read again
 
 
 def test_the_front_keeps_what_nothing_beats():

@@ -52,6 +52,19 @@ def test_a_derivative_that_cancels_is_caught(name, plain):
     assert measure(name, plain, arguments(plain), "smooth", COUNT, library(name)).worst > 5 * LIMIT
 
 
+@pytest.mark.parametrize("wide", [False, True], ids=["float32", "float64"])
+def test_a_derivative_that_is_not_finite_is_counted(wide):
+    """Also where it is the reference's alone, with which nothing can be compared."""
+
+    def pole(cos_i, f0):
+        value = library("fresnel.schlick")(cos_i, f0)
+        broken = (cos_i.dtype == jnp.float64) == wide
+        return value + jnp.sqrt(jnp.where(f0 > 0.5, 0 * f0, 1)) - 1 if broken else value
+
+    found = measure("fresnel.schlick", pole, ("cos_i", "f0"), "typical", COUNT)
+    assert COUNT / 4 < found.not_finite < 3 * COUNT / 4 and found.fault_input
+
+
 def test_a_lost_term_is_caught_by_the_oracle():
     def frozen(w, wm, alpha):
         return library("masking.g1_ggx")(w, wm, jax.lax.stop_gradient(alpha))

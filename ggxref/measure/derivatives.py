@@ -5,9 +5,10 @@ times the other. An error is the norm of a block's error over that of the exact 
 float64 at the same inputs stands for the exact one: `proof` compares it with difference quotients of the oracle.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -28,7 +29,8 @@ BLOCK = 1 << 14
 class Derivative:
     """Of one function in one region: errors are relative, of the well-conditioned blocks alone.
 
-    `ill` counts points with an ill-conditioned block, `not_finite` those with a derivative that is not, where the value is.
+    `ill` counts points with an ill-conditioned block, `not_finite` those with a derivative that is not, where the value is,
+    or with a reference that is not.
     """
 
     function: str
@@ -108,7 +110,7 @@ def half_ulp(x: np.ndarray) -> np.ndarray:
 
 def errors(run: Callable, truth: Callable, args, cut: dict[str, slice], rng: np.random.Generator):
     """Of each block at each point: relative error, −1 where it is not graded, and whether it is ill-conditioned; then
-    whether a derivative is not finite where the value is.
+    whether, where the value is finite, a derivative or a number of the reference is not.
     """
     computed, wide = run(*args).astype(np.float64), [a.astype(np.float64) for a in args]
     with np.errstate(all="ignore"):
@@ -117,13 +119,13 @@ def errors(run: Callable, truth: Callable, args, cut: dict[str, slice], rng: np.
         change = np.zeros_like(size)
         for _ in range(CORNERS):
             moved = [w + half_ulp(a) * rng.choice([-1.0, 1.0], w.shape) for w, a in zip(wide, args, strict=True)]
-            change = np.fmax(change, _norms(truth(*moved) - exactly, cut))
+            change = np.maximum(change, _norms(truth(*moved) - exactly, cut))  # NaN is ill-conditioned
         error = _norms(computed - exactly, cut) / size
         value = np.abs(exactly[:, 0]).max(0)
         seen = (size > FLOOR) & (size < float(np.finfo(args[0].dtype).max)) & ((value > FLOOR) | (value == 0))
         ill = seen & ~(change <= WELL * size)
     finite = np.isfinite(computed)
-    fault = finite[:, 0].all(0) & ~finite.all((0, 1))
+    fault = finite[:, 0].all(0) & ~(finite & np.isfinite(exactly)).all((0, 1))
     return np.where(seen & ~ill & finite[:, 0].all(0), np.where(np.isnan(error), np.inf, error), -1), ill, fault
 
 
@@ -166,7 +168,7 @@ def _leaves(value) -> list:
     return [leaf for part in value for leaf in _leaves(part)] if isinstance(value, tuple) else [value]
 
 
-def quotient(name: str, inputs: Points, argument: str, change: np.ndarray) -> np.ndarray:
+def quotient(name: str, inputs: Mapping[str, Any], argument: str, change: np.ndarray) -> np.ndarray:
     """The oracle's central difference along a change of one argument: a float for each number of the result."""
     oracle, start, along = lookup(name), {a: exact(x) for a, x in inputs.items()}, exact(change)
 
@@ -178,8 +180,10 @@ def quotient(name: str, inputs: Points, argument: str, change: np.ndarray) -> np
     return raised(difference, 320, name, inputs)
 
 
-def proof(name: str, function: Callable, draws: tuple[str, ...], region: str, count: int) -> np.ndarray:
+def proof(name: str, function: Callable, draws: tuple[str, ...], region: str, count: int, **options: str) -> np.ndarray:
     """Errors of the float64 derivative of the public function `name` against the oracle, relative to the block's size.
+
+    `function` is the public one with the `options`, if there are any.
 
     Each block of each point is applied to one random change of its argument: a direction's in the plane perpendicular to
     it, as the oracle normalises and the library need not.
@@ -199,7 +203,7 @@ def proof(name: str, function: Callable, draws: tuple[str, ...], region: str, co
                 change = (change + change.T) / 2
             if argument != block:  # one number of the argument
                 change = np.where(np.arange(len(x)) == int(block[-2]), x, 0)
-            inputs = {n: b[..., k] for n, b in zip(names, args, strict=True)}
+            inputs = {n: b[..., k] for n, b in zip(names, args, strict=True)} | options
             columns = jacobians[:, cut, k]
             along = np.ravel(change) if argument == block else change[int(block[-2])][None]
             expected = quotient(name, inputs, argument, change)

@@ -16,26 +16,26 @@ def _pieces_of(out: Path, kind: str, points: int) -> Path:
     return out / ".pieces" / f"{kind}-{points}"
 
 
-def _rows(kind: str, name: str, points: int) -> Rows:
-    return KINDS[kind](points)[name]()
+def _keep(path: Path, piece: Callable[[], Rows]) -> None:
+    write_atomically(path, json.dumps(piece()))
 
 
 def collect(kind: str, out: Path, points: int, jobs: int, advance: Callable[[int], None]) -> Rows:
-    """The rows of all pieces: read from an earlier run's files, or measured and then kept.
+    """The rows of all pieces, in their order: read from an earlier run's files, or measured, each kept as soon as it is.
 
     Pieces that time nothing are measured in `jobs` processes side by side, the others alone and after them.
     """
     folder = _pieces_of(out, kind, points)
     folder.mkdir(parents=True, exist_ok=True)
-    paths = {name: folder / f"{name}.json" for name in KINDS[kind](points)}
+    pieces = KINDS[kind](points)
+    paths = {name: folder / f"{name}.json" for name in pieces}
     missing = [name for name, path in paths.items() if not path.exists()]
     advance(len(paths) - len(missing))
     for alone in (False, True):
         names = [name for name in missing if timed(kind, name) == alone]
         with workers(1 if alone else min(jobs, max(len(names), 1))) as submit:
-            running = {name: submit(_rows, kind, name, points) for name in names}
-            for name in names:
-                write_atomically(paths[name], json.dumps(running.pop(name)()))
+            for finished in [submit(_keep, paths[name], pieces[name]) for name in names]:
+                finished()
                 advance(1)
     return [row for path in paths.values() for row in json.loads(path.read_text())]
 
