@@ -33,7 +33,7 @@ def refract(w: Vec3, wm: Vec3, eta: Real) -> Vec3:
     square = (1 - eta) * (1 + eta) + (eta * c) ** 2
     root = stable.sqrt(square)
     along = jnp.where(c > 0, eta * c - root, eta * c + root)
-    x, y, z = (jnp.where(square >= 0, along * m - eta * x, 0) for x, m in zip(w, wm, strict=True))
+    x, y, z = (jnp.where(square < 0, 0, along * m - eta * x) for x, m in zip(w, wm, strict=True))
     return jnp.stack(stable.one_loop(x, y, z))
 
 

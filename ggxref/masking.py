@@ -8,6 +8,7 @@ other side (walter2014 (7)), as transmission needs. All directions are unit, (3,
 
 import jax
 import jax.numpy as jnp
+from jax import lax
 
 from ggxref import _squares, stable
 from ggxref._seen import over_beckmann, over_ggx
@@ -34,10 +35,14 @@ def lambda_beckmann(w: Vec3, alpha: Vec2) -> Scalar:
     return tail * (s / (2 * jnp.abs(w[2])))  # s tail may underflow where Λ does not
 
 
-def _front(w, wm):
-    """χ⁺ of eq. (3) of heitz2014: is this side of the microfacet turned to `w`, seen from w's side of the surface?"""
-    cosine = stable.cosine(w, wm)
-    return ((cosine > 0) & (w[2] > 0)) | ((cosine < 0) & (w[2] < 0))  # a product could underflow
+def _on_front(w, wm, g1):
+    """`g1` where this side of the microfacet is turned to `w`, seen from w's side of the surface: χ⁺ of eq. (3) of heitz2014.
+
+    Else 0, but NaN of a NaN.
+    """
+    cosine = lax.stop_gradient(stable.cosine(w, wm))
+    front = ((cosine > 0) & (w[2] > 0)) | ((cosine < 0) & (w[2] < 0))  # a product could underflow
+    return jnp.where(front, g1, jnp.where(jnp.isnan(cosine), cosine, 0))
 
 
 def _up(w):
@@ -57,7 +62,7 @@ def g1_ggx(w: Vec3, wm: Vec3, alpha: Vec2) -> Scalar:
     dupuy2023 (15)–(17); tokuyoshi2024 as 1/(1 + Λ).
     """
     x, y, z = _up(w)
-    return jnp.where(_front(w, wm), 2 * over_ggx((x, y, z), _n(z), tuple(alpha), 1.0, z), 0)
+    return _on_front(w, wm, 2 * over_ggx((x, y, z), _n(z), tuple(alpha), 1.0, z))
 
 
 @stable.widened
@@ -65,7 +70,7 @@ def g1_beckmann(w: Vec3, wm: Vec3, alpha: Vec2) -> Scalar:
     r"""Smith's G1 for Beckmann: $1/(1 + \Lambda(\omega))$ on front faces, else 0. heitz2014 §2.1 (Smith 1967)."""
     up = _up(w)
     g1 = over_beckmann(tuple(up), _n(up[2]), tuple(alpha), sigma_beckmann(up, alpha), up[2])
-    return jnp.where(_front(w, wm), g1, 0)
+    return _on_front(w, wm, g1)
 
 
 @stable.widened
@@ -79,7 +84,7 @@ def g1_v_cavity(w: Vec3, wm: Vec3) -> Scalar:
     # Compare before dividing: the quotient overflows where the microfacet is seen edge-on.
     whole = masked >= cosine
     g1 = jnp.where(whole, 1, masked / jnp.where(whole, 1, cosine))
-    return jnp.where(_front(w, wm), g1, 0)
+    return _on_front(w, wm, g1)
 
 
 @stable.widened
@@ -97,7 +102,7 @@ def g1_ellipsoid(w: Vec3, wm: Vec3, A: Mat3) -> Scalar:
     sigma, z = sigma_ellipsoid(w_up, A), w_up[2]
     whole = z >= sigma
     g1 = jnp.where(whole, 1, z / jnp.where(whole, 1, sigma))
-    return jnp.where(_front(w, wm), g1, 0)
+    return _on_front(w, wm, g1)
 
 
 def g2_separable(g1_i: Real, g1_o: Real) -> Scalar:
@@ -108,7 +113,8 @@ def g2_separable(g1_i: Real, g1_o: Real) -> Scalar:
 @jax.custom_jvp
 def _correlated(g1_i, g1_o):
     denominator = g1_i + g1_o * (1 - g1_i)
-    return jnp.where(denominator > 0, g1_i * g1_o / jnp.where(denominator > 0, denominator, 1), 0)
+    masked = denominator <= 0
+    return jnp.where(masked, 0, g1_i * g1_o / jnp.where(masked, 1, denominator))
 
 
 @_correlated.defjvp

@@ -1,6 +1,6 @@
 r"""Normal distribution functions D: density of micronormals per unit solid angle and unit area of macrosurface [1/sr].
 
-$\int D(\omega_m)\,(\omega_m\cdot n)\,d\omega_m = 1$ (heitz2014 (1)). `wm` is unit, (3,); D is 0 where $\omega_m\cdot n \le 0$.
+$\int D(\omega_m)\,(\omega_m\cdot n)\,d\omega_m = 1$ (heitz2014 (1)). `wm` is unit, (3,); D is 0 where $\omega_m\cdot n \le 0$, and NaN of NaN.
 `alpha` is $(\alpha_x, \alpha_y)$, positive, (2,).
 """
 
@@ -16,7 +16,8 @@ from ggxref.slopes import student
 
 def hemisphere(wm: Vec3) -> Scalar:
     r"""$D = \chi^+(\omega_m\cdot n)/\pi$: GGX at α = 1. dupuy2023 (3)."""
-    return jnp.where(wm[2] > 0, 1 / math.pi, 0).astype(wm.dtype)
+    z = wm[2]
+    return jnp.where(z > 0, 1 / math.pi, jnp.where(z <= 0, 0, z)).astype(wm.dtype)
 
 
 def _stretched(wm, alpha):
@@ -32,7 +33,7 @@ def ggx(wm: Vec3, alpha: Vec2) -> Scalar:
     # A sum of squares: cos²(α² − 1) + 1, its equal on unit vectors, has lost every digit at α = 1e-4.
     q = _squares.stretched_square(wm, alpha)
     D = _squares.lobe(alpha[0], alpha[1], q)
-    return jnp.where(wm[2] > 0, D, 0)
+    return jnp.where(wm[2] <= 0, 0, D)
 
 
 @stable.widened
@@ -51,7 +52,7 @@ def beckmann_times(wm: Vec3, alpha: Vec2, factor: Real) -> Scalar:
     """
     rho, z_square = _stretched(wm, alpha), wm[2] ** 2
     # Beyond this exponent D is 0 in the dtype; towards the horizon z⁴ then is 0 too, and D or its gradient 0/0.
-    seen = (wm[2] > 0) & (rho < -2 * math.log(float(jnp.finfo(wm.dtype).tiny)) * z_square)
+    seen = ~((wm[2] <= 0) | (rho >= -2 * math.log(float(jnp.finfo(wm.dtype).tiny)) * z_square))
     z_square = jnp.where(seen, z_square, 1)
     x, y, z = (jnp.where(seen, c, d) for c, d in zip(wm, (0.0, 0.0, 1.0), strict=True))
     exponent, rest = _pairs.tangent_square(x, y, z, alpha[0], alpha[1])
@@ -69,9 +70,9 @@ def student_t(wm: Vec3, alpha: Vec2, gamma: Real) -> Scalar:
 
     Ribardière et al. 2017.
     """
-    above = wm[2] > 0
-    D = student(wm[0], wm[1], jnp.where(above, wm[2], 1), alpha[0], alpha[1], jnp.asarray(gamma, wm.dtype))
-    return jnp.where(above, D, 0)
+    below = wm[2] <= 0
+    D = student(wm[0], wm[1], jnp.where(below, 1, wm[2]), alpha[0], alpha[1], jnp.asarray(gamma, wm.dtype))
+    return jnp.where(below, 0, D)
 
 
 @stable.widened
@@ -92,4 +93,4 @@ def ellipsoid_of(wm: Vec3, A: Mat3, q: Scalar, det: Scalar) -> Scalar:
     """`ellipsoid` from what `inverse_square(wm, A)` gave."""
     An = jnp.sqrt(stable.dot(A[:, 2], A[:, 2]))
     D = _squares.lobe(det, An, q)
-    return jnp.where(wm[2] > 0, D, 0)
+    return jnp.where(wm[2] <= 0, 0, D)

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from ggxref import _pairs, _special, _squares, stable
 from ggxref._seen import area_ggx, over_beckmann, over_ggx
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
-from ggxref.ellipsoid import canonical
+from ggxref.ellipsoid import canonical, reciprocal_scale
 
 
 def from_normal(wm: Vec3) -> Vec2:
@@ -21,9 +21,12 @@ def from_normal(wm: Vec3) -> Vec2:
     return jnp.stack([-wm[0] / wm[2], -wm[1] / wm[2]])
 
 
+@stable.widened
 def to_normal(slope: Vec2) -> Vec3:
     """The micronormal with that slope: unit, (3,). heitz2014 §5.1, algorithm 4 step 5."""
-    return jnp.stack(stable.unit(-slope[0], -slope[1], jnp.ones_like(slope[0])))
+    x, y = slope
+    scale = reciprocal_scale(jnp.maximum(jnp.maximum(jnp.abs(x), jnp.abs(y)), 1))  # a square may leave the range
+    return jnp.stack(stable.unit(-x * scale, -y * scale, scale))
 
 
 def stretch(w: Vec3, factors: Vec2) -> Vec3:
@@ -144,10 +147,10 @@ def sigma_ggx(w: Vec3, alpha: Vec2) -> Scalar:
 def gaussian_tail(w, alpha):
     """`s = ‖(αx x, αy y)‖` and `ierfc(|z|/s)`, which is 0 at normal incidence: |z| Λ(w) is half their product."""
     square = _squares.scaled_square(w, alpha)
-    s = jnp.sqrt(jnp.where(square > 0, square, 1))
+    s = jnp.sqrt(jnp.where(square <= 0, 1, square))
     # From 30 on, ierfc is 0 in every dtype; the limit only stops the overflow of z/s at normal incidence.
     a = jnp.minimum(jnp.abs(w[2]), 30 * s) / s
-    seen = (square > 0) & (a < 30)
+    seen = ~((square <= 0) | (a >= 30))  # also NaN, which stays NaN
     x, z = jnp.where(seen, w[0], 1), jnp.where(seen, w[2], 1)
     exponent, rest = _pairs.height_square(x, jnp.where(seen, w[1], 1), z, alpha[0], alpha[1])
     return s, jnp.where(seen, _special.ierfc(a, (exponent, rest)), 0)
@@ -179,7 +182,7 @@ def visible_ggx(slope: Vec2, wi: Vec3, alpha: Vec2) -> Scalar:
     """
     m, factor = _factor(slope, wi)
     share = 2 * over_ggx(tuple(wi), m, tuple(alpha), 1.0, factor)
-    return jnp.where(factor > 0, share, 0) * ggx(slope, alpha)
+    return jnp.where(factor <= 0, 0, share) * ggx(slope, alpha)
 
 
 @stable.widened
@@ -187,4 +190,4 @@ def visible_beckmann(slope: Vec2, wi: Vec3, alpha: Vec2) -> Scalar:
     """`visible_ggx` for Beckmann slopes. heitz2014 (7)."""
     m, factor = _factor(slope, wi)
     share = over_beckmann(tuple(wi), m, tuple(alpha), sigma_beckmann(wi, alpha), factor)
-    return jnp.where(factor > 0, share, 0) * beckmann(slope, alpha)
+    return jnp.where(factor <= 0, 0, share) * beckmann(slope, alpha)

@@ -265,7 +265,12 @@ def _relative_jvp(primals, tangents):
 
 @widened
 def unit(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """The components divided by their length; the zero vector stays zero, with a zero gradient."""
+    """The components divided by their length; the zero vector stays zero, with a zero gradient.
+
+    For lengths whose square the dtype holds, in float32 from 1e-19 to 1.8e19: shorter ones come out too short, longer ones as
+    NaN. What is normalised here is near 1 by construction, or was scaled before (`ellipsoid.reciprocal_scale`): to scale
+    each would cost every sampler.
+    """
     x, y, z = turning(x, y, z)
     square = x * x + y * y + z * z
     scale = lax.stop_gradient(rsqrt(square))

@@ -23,7 +23,7 @@ def pdf_ggx(wm: Vec3, wi: Vec3, alpha: Vec2) -> Scalar:
     """
     cosine = stable.cosine(wi, wm)
     share = 2 * over_ggx(tuple(wi), tuple(wm), tuple(alpha), 1.0, cosine)
-    return jnp.where(cosine > 0, ndf.ggx(wm, alpha) * share, 0)
+    return jnp.where(cosine <= 0, 0, ndf.ggx(wm, alpha) * share)
 
 
 @stable.widened
@@ -36,7 +36,7 @@ def pdf_beckmann(wm: Vec3, wi: Vec3, alpha: Vec2) -> Scalar:
     """
     cosine = stable.cosine(wi, wm)
     share = over_beckmann(tuple(wi), tuple(wm), tuple(alpha), slopes.sigma_beckmann(wi, alpha), cosine)
-    return jnp.where(cosine > 0, ndf.beckmann_times(wm, alpha, share), 0)
+    return jnp.where(cosine <= 0, 0, ndf.beckmann_times(wm, alpha, share))
 
 
 @stable.widened
@@ -48,5 +48,5 @@ def pdf_ellipsoid(wm: Vec3, wi: Vec3, A: Mat3) -> Scalar:
     walter2014 (33).
     """
     cosine, sigma = stable.cosine(wi, wm), sigma_ellipsoid(wi, A)
-    seen = (cosine > 0) & (sigma >= jnp.finfo(sigma.dtype).tiny)
+    seen = ~((cosine <= 0) | (sigma < jnp.finfo(sigma.dtype).tiny))
     return jnp.where(seen, ndf.ellipsoid(wm, A) * (cosine / jnp.where(seen, sigma, 1)), 0)

@@ -17,7 +17,7 @@ _NDF = {"ggx": ndf.ggx, "beckmann": ndf.beckmann}
 def _share(wm, wi):
     """Of the area that the two walls of the cavity show to `wi`, the share of the one with normal `wm`."""
     a, b = _shown(wm, wi)
-    return a / jnp.where(a + b > 0, a + b, 1)
+    return a / jnp.where(a + b <= 0, 1, a + b)
 
 
 def _shown(wm, wi):
@@ -59,4 +59,4 @@ def pdf(wm: Vec3, wi: Vec3, alpha: Vec2, *, distribution: Literal["ggx", "beckma
     heitz2014 appendix B: (2) with the G1 of (3).
     """
     density = 2 * _share(wm, wi) * wm[2] * _NDF[distribution](wm, alpha)
-    return jnp.where(wi[2] > 0, density, 0)
+    return jnp.where(wi[2] <= 0, 0, density)
