@@ -24,10 +24,17 @@ _TAU_REST = 2.4492935982947064e-16  # of 2π, beyond its float64
 
 
 def _horner(coefficients, x):
-    value = coefficients[-1]
+    value = jnp.full_like(x, coefficients[-1])
     for c in reversed(coefficients[:-1]):
         value = value * x + c
     return value
+
+
+def _powers(chebyshev: tuple[float, ...], terms: int) -> dict[jnp.dtype, list[float]]:
+    """Chebyshev's series in powers, for Horner's rule: in float32 of so many terms. Clenshaw's rule would round twice as often."""
+    convert = np.polynomial.chebyshev.cheb2poly
+    narrow, wide = convert(chebyshev[:terms]).tolist(), convert(chebyshev).tolist()
+    return {jnp.dtype("float32"): narrow, jnp.dtype("float64"): wide}
 
 
 def cos_sin_turn(u: Real, terms: int | None = None) -> tuple[Scalar, Scalar]:
@@ -90,18 +97,12 @@ _IERFC = (
 )
 
 
-def _chebyshev(coefficients, t):
-    """The series at `t` in [-1, 1], by Clenshaw's recurrence."""
-    b, b_next = coefficients[-1] + jnp.zeros_like(t), jnp.zeros_like(t)
-    for c in reversed(coefficients[1:-1]):
-        b, b_next = c + 2 * t * b - b_next, b
-    return coefficients[0] + t * b - b_next
+_IERFC_POWERS = _powers(_IERFC, 16)
 
 
 def _ierfc_scaled(a):
     """exp(a²) ierfc(a) for a >= 0."""
-    series = _chebyshev(_IERFC if a.dtype == jnp.float64 else _IERFC[:16], (a - 3) / (a + 3))
-    return series / (math.sqrt(math.pi) * (1 + 2 * a * a))
+    return _horner(_IERFC_POWERS[a.dtype], (a - 3) / (a + 3)) / (math.sqrt(math.pi) * (1 + 2 * a * a))
 
 
 @jax.custom_jvp
@@ -181,6 +182,8 @@ _KEPLER_FAR = (
     7.626422005656268e-18,
 )
 
+_NEAR_POWERS, _FAR_POWERS = _powers(_KEPLER_NEAR, 7), _powers(_KEPLER_FAR, 11)
+
 # The bits of 1/∛x are these less a third of those of x, to within 4 %.
 _CBRT = {jnp.dtype("float32"): (jnp.int32, 0x54A2328C, 2), jnp.dtype("float64"): (jnp.int64, 0x553EF0FF289DD796, 3)}
 
@@ -212,7 +215,7 @@ def _odd(series, x, rest, t):
     """`x` times the series at `t`, of which all but the first coefficient are small, in two words."""
     first = x.dtype.type(series[0])
     value, error = two_product(x, jnp.asarray(first))
-    others = _chebyshev((series[0] - float(first), *series[1:]), t)
+    others = _horner([series[0] - float(first), *series[1:]], t)
     return _fast_two_sum(value, x * others + (rest * series[0] + error))
 
 
@@ -225,7 +228,7 @@ def kepler(v: Real) -> tuple[Scalar, Scalar]:
     function of the cube root of `v`, π − E one of 1/2 − v; the cosine takes its digits from the latter.
     """
     v = jnp.asarray(v)
-    near, far = (_KEPLER_NEAR, _KEPLER_FAR) if v.dtype == jnp.float64 else (_KEPLER_NEAR[:7], _KEPLER_FAR[:11])
+    near, far = _NEAR_POWERS[v.dtype], _FAR_POWERS[v.dtype]
     upper = v > 0.125
     (w, w_rest), d = _cbrt(jnp.where(upper, 0, v)), 0.5 - v
     angles = _odd(near, w, w_rest, 8 * w * w - 1), _odd(far, d, 0.0, (128 / 9) * d * d - 1)

@@ -301,13 +301,13 @@ def _lune_sum(au: _pairs.Pairs, av: _pairs.Pairs) -> tuple[Scalar, Scalar]:
 
 def _lune_sum_and_normal(au, av):
     """The two of `_lune_sum`, then ‖Au‖, ‖Av‖ and Au × Av."""
-    u, v = ([_pairs.rounded(p) for p in a] for a in (au, av))
+    u, v = (tuple(map(_pairs.rounded, a)) for a in (au, av))
     u_length, v_length = length(*u), length(*v)
     product = u_length * v_length
-    cosine = u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+    cosine = _pairs.rounded(_pairs.dot(u, v))
     x, y, z = _pairs.cross_of_pairs(au, av)
-    # Down to 120° the sum keeps its digits.
-    obtuse = cosine < -product / 2
+    # Down to 110° the sum keeps its digits better.
+    obtuse = cosine < -product / 3
     total = jnp.where(obtuse, (x * x + y * y + z * z) / jnp.where(obtuse, product - cosine, 1), product + cosine)
     return total, total / v_length, u_length, v_length, (x, y, z)
 

@@ -110,7 +110,8 @@ def sample_rejection_ellipsoid(u: Tries, wi: Vec3, A: Mat3) -> tuple[Vec3, Int[A
 
     def attempt(u):
         x, y = _disk(u)
-        m = jnp.stack(stable.unit(*times(A.T, *(x * t + y * b + stable.sqrt(1 - u[1]) * e3))))
+        # What cancels is computed once: contracted to FMAs here and not there, it would not have the length that is divided by.
+        m = jnp.stack(stable.unit(*stable.one_loop(*times(A.T, *(x * t + y * b + stable.sqrt(1 - u[1]) * e3)))))
         return m[2] > 0, m
 
     return _first(*jax.vmap(attempt)(u))
@@ -179,7 +180,7 @@ def sample_rejection_sphere(u: Tries, wi: Vec3, A: Mat3) -> tuple[Vec3, Int[Arra
             (moment[j] * a[k] - moment[k] * a[j]) / a_square + rise * a[i]
             for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
         )
-        m = stable.direction(*times(A.T, *p))
+        m = jnp.stack(stable.unit(*stable.one_loop(*times(A.T, *p))))
         return (miss <= 1) & (m[2] > 0), m
 
     return _first(*jax.vmap(attempt)(u))
