@@ -39,13 +39,16 @@ def brdf_ggx(wi: Vec3, wo: Vec3, alpha: Vec2) -> Scalar:
     - F's cosine, $\omega_i\cdot\omega_h$, is $\|h\|/2$.
     - Its gradient is cut to the end of the dtype's range, which it leaves towards the horizon.
 
-    tokuyoshi2024's D and dupuy2023 (13) in walter2014 (4): the heights of G2 and of the denominator cancel, h is never
-    normalised, and no digit is lost where $\omega_o$ is nearly $-\omega_i$. A third of the composition's time.
+    tokuyoshi2024's D and dupuy2023 (13) in walter2014 (4): the heights of G2 and of the denominator cancel, and h is never
+    normalised. It errs by no more than 10 ulp beyond what half an ulp of its inputs explains, also where $\omega_o$ is
+    nearly $-\omega_i$.
     """
     return _brdf_ggx(wi, wo, alpha)
 
 
-class _Mirrored(NamedTuple):
+class Mirrored(NamedTuple):
+    """What `brdf_ggx` and its derivative are made of."""
+
     h: tuple[Scalar, Scalar, Scalar]  # ωi + ωo, scaled by a power of two
     scale: Scalar
     square: Scalar  # of the scaled h
@@ -56,8 +59,9 @@ class _Mirrored(NamedTuple):
     seen: Bool[Array, ""]
 
 
-def _mirrored(wi, wo, alpha):
-    x, y, z = stable.unit_sum(wi, wo)
+def mirrored(h, wi, wo, alpha) -> Mirrored:
+    """`h`: ωi + ωo, in whatever form."""
+    x, y, z = h
     # The quotient q knows no length of h, whose squares may underflow near the horizon.
     scale = reciprocal_scale(jnp.abs(x) + jnp.abs(y) + jnp.abs(z))
     x, y, z = x * scale, y * scale, z * scale
@@ -66,14 +70,18 @@ def _mirrored(wi, wo, alpha):
     stretched = (x / alpha[0]) ** 2 + (y / alpha[1]) ** 2 + z * z
     length_i, length_o = (length(alpha[0] * w[0], alpha[1] * w[1], w[2]) for w in (wi, wo))
     between = wo[2] * length_i + wi[2] * length_o
-    return _Mirrored((x, y, z), scale, square, stretched, length_i, length_o, between, seen)
+    return Mirrored((x, y, z), scale, square, stretched, length_i, length_o, between, seen)
+
+
+def brdf_of(m: Mirrored, alpha: Vec2) -> Scalar:
+    """The value of `brdf_ggx`."""
+    inverse = (2 * math.pi * alpha[0]) * m.stretched * (alpha[1] * m.stretched) * m.between
+    return jnp.where(m.seen, m.square * m.square / inverse, 0)
 
 
 @jax.custom_jvp
 def _brdf_ggx(wi, wo, alpha):
-    m = _mirrored(wi, wo, alpha)
-    inverse = 2 * math.pi * (alpha[0] * m.stretched) * (alpha[1] * m.stretched) * m.between
-    return jnp.where(m.seen, m.square * m.square / jnp.where(m.seen, inverse, 1), 0)
+    return brdf_of(mirrored(stable.evened_sum(wi, wo), wi, wo, alpha), alpha)
 
 
 @_brdf_ggx.defjvp
@@ -83,10 +91,11 @@ def _brdf_ggx_jvp(primals, tangents):
     Where the derivative is, too, it is the end of the range, so that no sum of derivatives is inf − inf.
     """
     (wi, wo, alpha), (di, do, dalpha) = primals, tangents
-    value, m = _brdf_ggx(*primals), _mirrored(*primals)
+    m = mirrored(stable.evened_sum(wi, wo), wi, wo, alpha)
+    value = _brdf_ggx(*primals)
     square, stretched, between = (jnp.where(m.seen, x, 1) for x in (m.square, m.stretched, m.between))
     q, end = stretched / square, float(jnp.finfo(value.dtype).max) / 64
-    _, dh = jax.jvp(stable.unit_sum, (wi, wo), (di, do))
+    _, dh = jax.jvp(stable.evened_sum, (wi, wo), (di, do))
     factors, none = (alpha[0], alpha[1], jnp.ones_like(value)), jnp.zeros_like(value)
     terms = []
     for c, dc, a, da in zip(m.h, dh, factors, (*dalpha, none), strict=True):

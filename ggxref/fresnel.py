@@ -83,23 +83,18 @@ def conductor(cos_i: Real, eta: Real, k: Real) -> Scalar:
 def _conductor(cosine, eta, k):
     c = jnp.abs(cosine)
     sin_square = (1 - c) * (1 + c)
-    # (a + ib)² = (η + ik)² − sin²θ; the smaller of a, b comes from the product ab = ηk, as its difference cancels.
-    gap = (eta - 1) * (eta + 1) - k * k
-    real, imaginary = gap + c * c, eta * k
-    large_square = (stable.sqrt(real * real + 4 * imaginary * imaginary) + jnp.abs(real)) / 2
-    large = stable.sqrt(large_square)
-    small = imaginary / jnp.where(large > 0, large, 1)
-    a, b_square = jnp.where(real >= 0, large, small), jnp.where(real >= 0, small * small, large_square)
-    total = a + c
-    # a − c cancels as the index goes to 1; a² − c² = gap + b² does not.
-    faint = (total > 0) & (jnp.abs(gap) + b_square < c * total)
-    difference = jnp.where(faint, (gap + b_square) / jnp.where(faint, total, 1), a - c)
-    # Each numerator and denominator as a sum of squares, and one quotient of them all.
-    s_minus, s_plus = difference * difference + b_square, total * total + b_square
-    p_minus, p_plus = ((a * c + sign * sin_square) ** 2 + b_square * c * c for sign in (-1, 1))
-    p_plus, p_minus = (jnp.where(p_plus <= 0, 1, p) for p in (p_plus, p_minus))
-    whole = s_plus * p_plus
-    return jnp.where(whole <= 0, 0, s_minus * (p_plus + p_minus) / (2 * jnp.where(whole <= 0, 1, whole)))
+    # N = η + ik, a + ib = √(N² − sin²θ); what is left of cancelling sums is r_s = (1 − N²)/(c + a + ib)².
+    gap, imaginary = (eta - 1) * (eta + 1) - k * k, eta * k
+    real = gap + c * c
+    norm = jnp.sqrt(real * real + 4 * imaginary * imaginary)  # a² + b²
+    # The smaller of a, b comes from the product ab = ηk, as its difference cancels.
+    large_square = (norm + jnp.abs(real)) / 2
+    a = jnp.where(real >= 0, large_square, imaginary) * stable.rsqrt(large_square)
+    # |r_p/r_s|² = (W − 2ac sin²θ)/(W + 2ac sin²θ), and F is half of |r_s|² + |r_p|².
+    W, twice = norm * c * c + sin_square * sin_square, 2 * a * c
+    total = norm + c * c + twice
+    denominator = total * total * (W + twice * sin_square)
+    return jnp.where(denominator > 0, (gap * gap + 4 * imaginary * imaginary) * W / denominator, 0)
 
 
 @_conductor.defjvp

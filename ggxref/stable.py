@@ -141,6 +141,17 @@ def unit_sum(a: Vec3, b: Vec3) -> tuple[Scalar, Scalar, Scalar]:
 
 
 @widened
+def evened_sum(a: Vec3, b: Vec3) -> tuple[Scalar, Scalar, Scalar]:
+    """`a + b` for directions of exactly equal length, at a seventh of `unit_sum`'s cost: a sum of two such is perpendicular to
+    their difference, and what that product lacks of 0 tells which is longer, to within what half an ulp of either does.
+    """
+    x, y, z = (p + q for p, q in zip(a, b, strict=True))
+    p, q, r = (p - q for p, q in zip(a, b, strict=True))
+    longer = (x * p + y * q + z * r) / 4
+    return x - longer * p, y - longer * q, z - longer * r
+
+
+@widened
 def weighted_sum(a: Vec3, b: Vec3, n_a: Real, n_b: Real) -> tuple[Scalar, Scalar, Scalar]:
     """`n_a a + n_b b` for exactly unit directions, as `unit_sum`; here the products are rounded, and cancel."""
     n_a, n_b = jnp.asarray(n_a, a.dtype), jnp.asarray(n_b, a.dtype)

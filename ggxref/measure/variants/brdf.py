@@ -1,7 +1,5 @@
 """Forms of the half vector and of a metal's whole BRDF [1/sr], a bounce's evaluation. `wi`, `wo`: unit, (3,), above the horizon."""
 
-import math
-
 import jax.numpy as jnp
 
 from ggxref import bsdf, fresnel, geometry, masking, ndf, stable
@@ -25,10 +23,19 @@ def half_plain(wi, wo):
     return jnp.stack(stable.unit(*(p + q for p, q in zip(wi, wo, strict=True))))
 
 
+def conductor_of_sum(wi, wo):
+    """F, whose cosine is ‖ω_i + ω_o‖/2: near 1 at grazing angles, where the sum loses digits."""
+    return fresnel.conductor(jnp.sqrt(sum((p + q) ** 2 for p, q in zip(wi, wo, strict=True))) / 2, ETA, K)
+
+
 def one_expression(wi, wo, alpha):
-    """The library's BRDF times F, whose cosine is ‖ω_i + ω_o‖/2."""
-    cosine = jnp.sqrt(sum(c * c for c in stable.unit_sum(wi, wo))) / 2
-    return bsdf.brdf_ggx(wi, wo, alpha) * fresnel.conductor(cosine, ETA, K)
+    """The library's BRDF times F."""
+    return bsdf.brdf_ggx(wi, wo, alpha) * conductor_of_sum(wi, wo)
+
+
+def exact_lengths(wi, wo, alpha):
+    """The same of ω_i + ω_o without any rounding in their lengths."""
+    return bsdf.brdf_of(bsdf.mirrored(stable.unit_sum(wi, wo), wi, wo, alpha), alpha) * conductor_of_sum(wi, wo)
 
 
 def composed(wi, wo, alpha, *, half=geometry.half_reflection):
@@ -45,14 +52,9 @@ def composed_plain(wi, wo, alpha):
 
 
 def plain(wi, wo, alpha):
-    """The one expression with nothing compensated."""
-    x, y, z = (p + q for p, q in zip(wi, wo, strict=True))
-    square = x * x + y * y + z * z
-    stretched = (x / alpha[0]) ** 2 + (y / alpha[1]) ** 2 + z * z
-    length_i, length_o = (jnp.sqrt((alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2 + w[2] ** 2) for w in (wi, wo))
-    F = fresnel.conductor(jnp.sqrt(square) / 2, ETA, K)
-    between = wo[2] * length_i + wi[2] * length_o
-    return F * square * square / (2 * math.pi * (alpha[0] * stretched) * (alpha[1] * stretched) * between)
+    """The same with nothing compensated."""
+    h = [p + q for p, q in zip(wi, wo, strict=True)]
+    return bsdf.brdf_of(bsdf.mirrored(h, wi, wo, alpha), alpha) * conductor_of_sum(wi, wo)
 
 
 HALF = (
@@ -61,6 +63,9 @@ HALF = (
 )
 BRDF = (
     Variant("one expression", "ggxref.bsdf.brdf_ggx", one_expression),
+    Variant(
+        "one expression, exact lengths", "ggxref.bsdf.brdf_ggx with the sum of exactly unit directions", exact_lengths
+    ),
     Variant("composed", "ggxref.bsdf.brdf of the library's D, G2 and F", composed),
     Variant("composed, plain half vector", "the same at the plain half vector", composed_plain),
     Variant("one expression, plain", "ggxref.bsdf.brdf_ggx with the plain sum of the directions", plain),
