@@ -56,7 +56,7 @@ class Mirrored(NamedTuple):
     length_i: Scalar
     length_o: Scalar
     between: Scalar
-    seen: Bool[Array, ""]
+    unseen: Bool[Array, ""]
 
 
 def mirrored(h, wi, wo, alpha) -> Mirrored:
@@ -66,17 +66,17 @@ def mirrored(h, wi, wo, alpha) -> Mirrored:
     scale = reciprocal_scale(jnp.abs(x) + jnp.abs(y) + jnp.abs(z))
     x, y, z = x * scale, y * scale, z * scale
     square = x * x + y * y + z * z
-    seen = (wi[2] > 0) & (wo[2] > 0) & (square > 0)
+    unseen = (wi[2] <= 0) | (wo[2] <= 0) | (square <= 0)  # a NaN is not
     stretched = (x / alpha[0]) ** 2 + (y / alpha[1]) ** 2 + z * z
     length_i, length_o = (length(alpha[0] * w[0], alpha[1] * w[1], w[2]) for w in (wi, wo))
     between = wo[2] * length_i + wi[2] * length_o
-    return Mirrored((x, y, z), scale, square, stretched, length_i, length_o, between, seen)
+    return Mirrored((x, y, z), scale, square, stretched, length_i, length_o, between, unseen)
 
 
 def brdf_of(m: Mirrored, alpha: Vec2) -> Scalar:
     """The value of `brdf_ggx`."""
     inverse = (2 * math.pi * alpha[0]) * m.stretched * (alpha[1] * m.stretched) * m.between
-    return jnp.where(m.seen, m.square * m.square / inverse, 0)
+    return jnp.where(m.unseen, 0, m.square * m.square / inverse)
 
 
 @jax.custom_jvp
@@ -93,7 +93,7 @@ def _brdf_ggx_jvp(primals, tangents):
     (wi, wo, alpha), (di, do, dalpha) = primals, tangents
     m = mirrored(stable.evened_sum(wi, wo), wi, wo, alpha)
     value = _brdf_ggx(*primals)
-    square, stretched, between = (jnp.where(m.seen, x, 1) for x in (m.square, m.stretched, m.between))
+    square, stretched, between = (jnp.where(m.unseen, 1, x) for x in (m.square, m.stretched, m.between))
     q, end = stretched / square, float(jnp.finfo(value.dtype).max) / 64
     _, dh = jax.jvp(stable.evened_sum, (wi, wo), (di, do))
     factors, none = (alpha[0], alpha[1], jnp.ones_like(value)), jnp.zeros_like(value)
@@ -108,7 +108,7 @@ def _brdf_ggx_jvp(primals, tangents):
             terms += [(part * (a * a * c), dc), (part * (a * c * c), da)]
         terms.append((-value * (other / between), dw[2]))
     change = sum((jnp.clip(by, -end, end) * d for by, d in terms), jnp.zeros_like(value))
-    return value, jnp.where(m.seen, change, 0)
+    return value, jnp.where(m.unseen, 0, change)
 
 
 def btdf(wi: Vec3, wo: Vec3, n_i: Real, n_o: Real, D: Real, G2: Real, F: Real) -> Scalar:

@@ -94,7 +94,7 @@ def _conductor(cosine, eta, k):
     W, twice = norm * c * c + sin_square * sin_square, 2 * a * c
     total = norm + c * c + twice
     denominator = total * total * (W + twice * sin_square)
-    return jnp.where(denominator > 0, (gap * gap + 4 * imaginary * imaginary) * W / denominator, 0)
+    return jnp.where(denominator <= 0, 0, (gap * gap + 4 * imaginary * imaginary) * W / denominator)
 
 
 @_conductor.defjvp

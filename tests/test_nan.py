@@ -17,6 +17,12 @@ NAMES = [n for n in FUNCTIONS if n.split(".")[0] in MODULES] + [
     "sampling.slope_beckmann.pdf",
     "sampling.lune.pdf",
     "sampling.v_cavity.pdf",
+    "sampling.bounded_cap.pdf",
+    "sampling.ellipsoid_bounded.pdf",
+    "sampling.spherical_cap.sample",
+    "sampling.bounded_cap.sample",
+    "sampling.ellipsoid_cap.sample",
+    "bsdf.brdf_ggx",
 ]
 # Of these a formula depends on the height alone.
 ABSENT = {("ndf.hemisphere", "wm", 0), ("ndf.hemisphere", "wm", 1)}
@@ -30,6 +36,7 @@ POINT = (
         "factors": [0.3, 0.5],
         "slope": [0.2, -0.1],
         "A": [[0.3, 0.1, 0.0], [0.0, 0.5, 0.0], [0.2, -0.1, 1.0]],
+        "u": [0.3, 0.6],
         "gamma": 3.0,
         "eta": 0.7,
         "k": 2.0,

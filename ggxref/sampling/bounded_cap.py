@@ -60,6 +60,6 @@ def pdf(wm: Vec3, wi: Vec3, alpha: Vec2) -> Scalar:
     # o'_z + i'_z = 2 (ωi·ωm) z_m / (norm q) has to reach (1 − k) z_i / norm.
     q = (wm[0] / alpha[0]) ** 2 + (wm[1] / alpha[1]) ** 2 + wm[2] ** 2
     slack = 1 - 16 * float(jnp.finfo(wm.dtype).eps)
-    inside = (cosine > 0) & (2 * cosine * wm[2] >= slack * cut * wi[2] * q)
+    outside = (cosine <= 0) | (2 * cosine * wm[2] < slack * cut * wi[2] * q)  # a NaN is not
     share = over_ggx(tuple(wi), tuple(wm), tuple(alpha), k, cosine)
-    return jnp.where(inside, 2 * ndf.ggx(wm, alpha) * share, 0)
+    return jnp.where(outside, 0, 2 * ndf.ggx(wm, alpha) * share)

@@ -38,7 +38,7 @@ def _largest_q(wi: Vec3, A: Canonical):
 def _cut(wi, A):
     """o'_z + i'_z at the cap's lower end, in units of ‖A ωi‖."""
     c_square, q = _largest_q(wi, A)
-    return jnp.where(wi[2] > 0, wi[2] * (c_square / (c_square + q)), 0)
+    return jnp.where(wi[2] <= 0, 0, wi[2] * (c_square / (c_square + q)))
 
 
 @stable.widened
@@ -84,6 +84,6 @@ def pdf(wm: Vec3, wi: Vec3, A: Mat3) -> Scalar:
     slack = 1 - 64 * float(jnp.finfo(wm.dtype).eps)
     # A is canonical up to a rotation and the factor ‖A n‖.
     q, det = inverse_square(wm, A)
-    inside = (cosine > 0) & (2 * cosine * wm[2] >= slack * cut * (normal_square(A) * q))
+    outside = (cosine <= 0) | (2 * cosine * wm[2] < slack * cut * (normal_square(A) * q))  # a NaN is not
     area = rise - cut
-    return jnp.where(inside, 2 * ndf.ellipsoid_of(wm, A, q, det) * cosine / jnp.where(inside, area, 1), 0)
+    return jnp.where(outside, 0, 2 * ndf.ellipsoid_of(wm, A, q, det) * cosine / jnp.where(outside, 1, area))
