@@ -4,7 +4,7 @@
 
 glibc gives large arrays back to the operating system, and asks for the next anew, a page at a time. The environment is read when a process
 starts, hence one process for each setting. Components are arrays of their own, of 16 MB; "packed": in one of 48 MB.
-"donated": the result takes the place of ω_i.
+"donated": the result takes the place of the one before.
 """
 
 import os
@@ -27,18 +27,20 @@ SETTINGS = (
 
 
 def in_place(args):
-    """A subject whose result is its next argument, a component at a time."""
+    """A subject whose result takes the place of the one before, which it is given and does not read."""
     u, wi, alpha = args
     mapped = jax.vmap(spherical_cap.sample, (-1, -1, None), -1)
 
-    def run(wi, u):
+    def run(u, wi, _):
         return speed.components(mapped(jnp.stack(u), jnp.stack(wi), alpha))
 
-    program, u = jax.jit(run, donate_argnums=0), speed.components(u)
-    kept = [speed.components(wi.copy())]
+    # Donated ω_i would be copied first: a loop of several results may not write where it reads.
+    program = jax.jit(run, donate_argnums=2, keep_unused=True)
+    u, wi = speed.components(u), speed.components(wi)
+    kept = [[jnp.zeros(POINTS, jnp.float32) for _ in range(3)]]
 
     def call():
-        kept[0] = jax.block_until_ready(program(kept[0], u))
+        kept[0] = jax.block_until_ready(program(u, wi, kept[0]))
 
     return call
 

@@ -4,6 +4,8 @@
 indices alone.
 """
 
+import math
+
 import jax
 import jax.numpy as jnp
 from jax import lax
@@ -82,19 +84,19 @@ def conductor(cos_i: Real, eta: Real, k: Real) -> Scalar:
 @jax.custom_jvp
 def _conductor(cosine, eta, k):
     c = jnp.abs(cosine)
-    sin_square = (1 - c) * (1 + c)
+    c_square = c * c
+    sin_square = 1 - c_square  # its digits are needed beside 1 only
     # N = η + ik, a + ib = √(N² − sin²θ); what is left of cancelling sums is r_s = (1 − N²)/(c + a + ib)².
-    gap, imaginary = (eta - 1) * (eta + 1) - k * k, eta * k
-    real = gap + c * c
-    norm = jnp.sqrt(real * real + 4 * imaginary * imaginary)  # a² + b²
-    # The smaller of a, b comes from the product ab = ηk, as its difference cancels.
-    large_square = (norm + jnp.abs(real)) / 2
-    a = jnp.where(real >= 0, large_square, imaginary) * stable.rsqrt(large_square)
+    gap, imaginary = (eta - 1) * (eta + 1) - k * k, 2 * eta * k
+    real = gap + c_square
+    norm = jnp.sqrt(real * real + imaginary * imaginary)  # a² + b²
+    # 2ac; where real < 0, b is the larger of a, b, and a = ηk/b, as its difference cancels.
+    larger = norm + jnp.abs(real)
+    twice = jnp.where(real >= 0, larger, imaginary) * stable.rsqrt(larger) * (math.sqrt(2) * c)
     # |r_p/r_s|² = (W − 2ac sin²θ)/(W + 2ac sin²θ), and F is half of |r_s|² + |r_p|².
-    W, twice = norm * c * c + sin_square * sin_square, 2 * a * c
-    total = norm + c * c + twice
+    W, total = norm * c_square + sin_square * sin_square, norm + c_square + twice
     denominator = total * total * (W + twice * sin_square)
-    return jnp.where(denominator <= 0, 0, (gap * gap + 4 * imaginary * imaginary) * W / denominator)
+    return jnp.where(denominator <= 0, 0, (gap * gap + imaginary * imaginary) * W / denominator)
 
 
 @_conductor.defjvp
