@@ -1,6 +1,8 @@
 """D, G and F put together: BRDF, BTDF [1/sr] and the weights of the samplers, from their values."""
 
+import functools
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
@@ -30,12 +32,13 @@ def brdf(wi: Vec3, wo: Vec3, D: Real, G2: Real, F: Real) -> Scalar:
 
 
 @stable.widened
-def brdf_ggx(wi: Vec3, wo: Vec3, alpha: Vec2) -> Scalar:
+def brdf_ggx(wi: Vec3, wo: Vec3, alpha: Vec2, *, add: Callable = stable.evened_sum) -> Scalar:
     r"""$f_r$ of GGX with height-correlated masking, but for F [1/sr]: `brdf` of its D and G2, in one expression of
     $h = \omega_i + \omega_o$, $\frac{1}{2\pi\alpha_x\alpha_y q^2 (z_o\|A\omega_i\| + z_i\|A\omega_o\|)}$ with
     $q = (h_x^2/\alpha_x^2 + h_y^2/\alpha_y^2 + h_z^2)/\|h\|^2$, $A = \mathrm{diag}(\alpha_x, \alpha_y, 1)$.
 
     - `wi`, `wo`: unit, (3,); 0 unless both are above the horizon. `alpha`: positive, (2,).
+    - `add`: the form of $\omega_i + \omega_o$. `stable.unit_sum` errs by no more than 16 ulp in all, for half as much time again.
     - F's cosine, $\omega_i\cdot\omega_h$, is $\|h\|/2$.
     - Its gradient is cut to the end of the dtype's range, which it leaves towards the horizon.
 
@@ -43,12 +46,10 @@ def brdf_ggx(wi: Vec3, wo: Vec3, alpha: Vec2) -> Scalar:
     normalised. It errs by no more than 10 ulp beyond what half an ulp of its inputs explains, also where $\omega_o$ is
     nearly $-\omega_i$.
     """
-    return _brdf_ggx(wi, wo, alpha)
+    return _brdf_ggx(add, wi, wo, alpha)
 
 
-class Mirrored(NamedTuple):
-    """What `brdf_ggx` and its derivative are made of."""
-
+class _Mirrored(NamedTuple):
     h: tuple[Scalar, Scalar, Scalar]  # ωi + ωo, scaled by a power of two
     scale: Scalar
     square: Scalar  # of the scaled h
@@ -59,9 +60,8 @@ class Mirrored(NamedTuple):
     unseen: Bool[Array, ""]
 
 
-def mirrored(h, wi, wo, alpha) -> Mirrored:
-    """`h`: ωi + ωo, in whatever form."""
-    x, y, z = h
+def _mirrored(add, wi, wo, alpha):
+    x, y, z = add(wi, wo)
     # The quotient q knows no length of h, whose squares may underflow near the horizon.
     scale = reciprocal_scale(jnp.abs(x) + jnp.abs(y) + jnp.abs(z))
     x, y, z = x * scale, y * scale, z * scale
@@ -70,32 +70,28 @@ def mirrored(h, wi, wo, alpha) -> Mirrored:
     stretched = (x / alpha[0]) ** 2 + (y / alpha[1]) ** 2 + z * z
     length_i, length_o = (length(alpha[0] * w[0], alpha[1] * w[1], w[2]) for w in (wi, wo))
     between = wo[2] * length_i + wi[2] * length_o
-    return Mirrored((x, y, z), scale, square, stretched, length_i, length_o, between, unseen)
+    return _Mirrored((x, y, z), scale, square, stretched, length_i, length_o, between, unseen)
 
 
-def brdf_of(m: Mirrored, alpha: Vec2) -> Scalar:
-    """The value of `brdf_ggx`."""
+@functools.partial(jax.custom_jvp, nondiff_argnums=(0,))
+def _brdf_ggx(add, wi, wo, alpha):
+    m = _mirrored(add, wi, wo, alpha)
     inverse = (2 * math.pi * alpha[0]) * m.stretched * (alpha[1] * m.stretched) * m.between
     return jnp.where(m.unseen, 0, m.square * m.square / inverse)
 
 
-@jax.custom_jvp
-def _brdf_ggx(wi, wo, alpha):
-    return brdf_of(mirrored(stable.evened_sum(wi, wo), wi, wo, alpha), alpha)
-
-
 @_brdf_ggx.defjvp
-def _brdf_ggx_jvp(primals, tangents):
+def _brdf_ggx_jvp(add, primals, tangents):
     """Each partial derivative as the value times a quotient: near the horizon the value's square is beyond the dtype's range.
 
     Where the derivative is, too, it is the end of the range, so that no sum of derivatives is inf − inf.
     """
     (wi, wo, alpha), (di, do, dalpha) = primals, tangents
-    m = mirrored(stable.evened_sum(wi, wo), wi, wo, alpha)
-    value = _brdf_ggx(*primals)
+    m = _mirrored(add, wi, wo, alpha)
+    value = _brdf_ggx(add, *primals)
     square, stretched, between = (jnp.where(m.unseen, 1, x) for x in (m.square, m.stretched, m.between))
     q, end = stretched / square, float(jnp.finfo(value.dtype).max) / 64
-    _, dh = jax.jvp(stable.evened_sum, (wi, wo), (di, do))
+    _, dh = jax.jvp(add, (wi, wo), (di, do))
     factors, none = (alpha[0], alpha[1], jnp.ones_like(value)), jnp.zeros_like(value)
     terms = []
     for c, dc, a, da in zip(m.h, dh, factors, (*dalpha, none), strict=True):

@@ -18,14 +18,18 @@ def exact_brdf(wi, wo, alpha):
     return reference.bsdf_brdf_ggx(wi, wo, alpha) * F
 
 
+def plain_sum(wi, wo):
+    return tuple(p + q for p, q in zip(wi, wo, strict=True))
+
+
 def half_plain(wi, wo):
     """The sum of the directions as they are, normalised."""
-    return jnp.stack(stable.unit(*(p + q for p, q in zip(wi, wo, strict=True))))
+    return jnp.stack(stable.unit(*plain_sum(wi, wo)))
 
 
 def conductor_of_sum(wi, wo):
     """F, whose cosine is ‖ω_i + ω_o‖/2: near 1 at grazing angles, where the sum loses digits."""
-    return fresnel.conductor(jnp.sqrt(sum((p + q) ** 2 for p, q in zip(wi, wo, strict=True))) / 2, ETA, K)
+    return fresnel.conductor(jnp.sqrt(sum(c * c for c in plain_sum(wi, wo))) / 2, ETA, K)
 
 
 def one_expression(wi, wo, alpha):
@@ -35,7 +39,7 @@ def one_expression(wi, wo, alpha):
 
 def exact_lengths(wi, wo, alpha):
     """The same of ω_i + ω_o without any rounding in their lengths."""
-    return bsdf.brdf_of(bsdf.mirrored(stable.unit_sum(wi, wo), wi, wo, alpha), alpha) * conductor_of_sum(wi, wo)
+    return bsdf.brdf_ggx(wi, wo, alpha, add=stable.unit_sum) * conductor_of_sum(wi, wo)
 
 
 def composed(wi, wo, alpha, *, half=geometry.half_reflection):
@@ -53,8 +57,7 @@ def composed_plain(wi, wo, alpha):
 
 def plain(wi, wo, alpha):
     """The same with nothing compensated."""
-    h = [p + q for p, q in zip(wi, wo, strict=True)]
-    return bsdf.brdf_of(bsdf.mirrored(h, wi, wo, alpha), alpha) * conductor_of_sum(wi, wo)
+    return bsdf.brdf_ggx(wi, wo, alpha, add=plain_sum) * conductor_of_sum(wi, wo)
 
 
 HALF = (
