@@ -12,6 +12,7 @@ from jax import lax
 
 from ggxref import stable
 from ggxref._types import Real, Scalar
+from ggxref.ellipsoid import reciprocal_scale
 
 
 @stable.widened
@@ -84,19 +85,23 @@ def conductor(cos_i: Real, eta: Real, k: Real) -> Scalar:
 @jax.custom_jvp
 def _conductor(cosine, eta, k):
     c = jnp.abs(cosine)
-    c_square = c * c
-    sin_square = 1 - c_square  # its digits are needed beside 1 only
+    c_square, sin_square = c * c, (1 - c) * (1 + c)
     # N = η + ik, a + ib = √(N² − sin²θ); what is left of cancelling sums is r_s = (1 − N²)/(c + a + ib)².
     gap, imaginary = (eta - 1) * (eta + 1) - k * k, 2 * eta * k
-    real = gap + c_square
+    real = jnp.where(c_square > 0.5, (eta - k) * (eta + k) - sin_square, gap + c_square)
     norm = jnp.sqrt(real * real + imaginary * imaginary)  # a² + b²
     # 2ac; where real < 0, b is the larger of a, b, and a = ηk/b, as its difference cancels.
     larger = norm + jnp.abs(real)
     twice = jnp.where(real >= 0, larger, imaginary) * stable.rsqrt(larger) * (math.sqrt(2) * c)
-    # |r_p/r_s|² = (W − 2ac sin²θ)/(W + 2ac sin²θ), and F is half of |r_s|² + |r_p|².
-    W, total = norm * c_square + sin_square * sin_square, norm + c_square + twice
-    denominator = total * total * (W + twice * sin_square)
-    return jnp.where(denominator <= 0, 0, (gap * gap + imaginary * imaginary) * W / denominator)
+    # |r_p/r_s|² = (W − 2ac sin²θ)/(W + 2ac sin²θ), and F is half of |r_s|² + |r_p|². W is never 0, but by underflow.
+    tiny = float(jnp.finfo(c.dtype).tiny) * 2**20
+    W, total = norm * c_square + (sin_square * sin_square + tiny), norm + c_square + twice
+    # By a power of two, as the products go with N to the sixth.
+    scale = reciprocal_scale(total)
+    r_s = (gap * gap + imaginary * imaginary) * scale * scale
+    denominator = (total * scale) ** 2 * ((W + twice * sin_square) * scale)
+    F = r_s * (W * scale) / denominator
+    return jnp.where(denominator <= 0, 0, jnp.where(F > 1, 1, F))
 
 
 @_conductor.defjvp

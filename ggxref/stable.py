@@ -187,7 +187,7 @@ def _sqrt_jvp(primals, tangents):
     (x,), (dx,) = primals, tangents
     root = sqrt(x)
     # The derivative is written by hand: the two `where` that would stop its NaN cost a third of a sampler's time.
-    return root, jnp.where(root > 0, 0.5 / jnp.where(root > 0, root, 1), 0) * dx
+    return root, jnp.where(root <= 0, 0, 0.5 / jnp.where(root <= 0, 1, root)) * dx
 
 
 def _from_exponent(x: Scalar, power: float, shift: float) -> Scalar:
@@ -224,7 +224,7 @@ def _rsqrt_jvp(primals, tangents):
 
 @traced_once
 def crude_quotient(a: Scalar, b: Scalar) -> Scalar:
-    """`a / b` to within 4e-5 by products, for a finite `b >= 0`; 0 where `a` is 0. For a correction, which is small itself."""
+    """`a / b` to within 4e-5 by products, for `b` from 0 to 1e38; 0 where `a` is 0. For a correction, which is small itself."""
     guess = _from_exponent(b, -1.0, 0.1577148)
     rest = 1 - b * guess
     return a * guess * (1 + rest * (0.9973773 + 1.11207204 * rest))
@@ -270,16 +270,17 @@ def relative(x: Scalar, length: Scalar) -> Scalar:
 @relative.defjvp
 def _relative_jvp(primals, tangents):
     (x, length), (dx, dlength) = primals, tangents
-    x = relative(x, length)
-    return x, dx - x * (dlength / jnp.where(length > 0, length, 1))
+    x, length = relative(x, length), jnp.where(length > 0, length, 1)
+    held = lax.stop_gradient(length) / length  # 1, for second derivatives
+    return x, held * dx - x * (dlength / length)
 
 
 @widened
 def unit(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     """The components divided by their length; the zero vector stays zero, with a zero gradient.
 
-    For lengths whose square the dtype holds, in float32 from 1e-19 to 1.8e19: shorter ones come out too short, longer ones as
-    NaN. What is normalised here is near 1 by construction, or was scaled before (`ellipsoid.reciprocal_scale`): to scale
+    For lengths whose square the dtype holds, in float32 from 2e-19 to 1.8e19: shorter ones come out with any length up to 7, longer
+    ones as NaN. What is normalised here is near 1 by construction, or was scaled before (`ellipsoid.reciprocal_scale`): to scale
     each would cost every sampler.
     """
     x, y, z = turning(x, y, z)

@@ -216,3 +216,21 @@ def test_brdf_of_opposite_directions_does_not_underflow(height):
     wi, wo = (jnp.asarray([x, 0, height], jnp.float32) for x in (1, -1))
     found = public("bsdf.brdf_ggx")(wi, wo, jnp.asarray([0.5, 0.25], jnp.float32))
     np.testing.assert_allclose(found, 1 / (4 * np.pi * 0.5**2 * 0.25 * float(wi[2])), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("cosine", "eta", "k", "F"),
+    [(1, 1e-20, 0, 1), (1, 2e-4, 0, 0.99920032), (0.5, 1, 1e7, 1), (0.5, 1e9, 0, 1), (0, 1, 0, 0), (0.3, 1, 0, 0)],
+)
+def test_conductor_of_extreme_indices(cosine, eta, k, F):
+    """The products in it go with the index to the sixth, and a small one cancels."""
+    found = public("fresnel.conductor")(*(jnp.float32(x) for x in (cosine, eta, k)))
+    np.testing.assert_allclose(found, F, rtol=1e-6)
+
+
+def test_conductor_reflects_no_more_than_all():
+    """Total reflection, where F is 1 but for its rounding."""
+    rng = np.random.default_rng(3)
+    cosine, eta = rng.uniform(0, 0.3, 4096).astype(np.float32), rng.uniform(0.05, 0.9, 4096).astype(np.float32)
+    found = over_rows(public("fresnel.conductor"), {"cos_i": cosine, "eta": eta, "k": np.zeros_like(eta)})
+    assert np.all(found <= 1) and np.all(found > 1 - 2e-6)

@@ -10,6 +10,7 @@ from ggxref.measure.accuracy import arguments
 from ggxref.measure.derivatives import measure, points, proof
 from ggxref.measure.regions import rounded
 from ggxref.measure.tables import DRAWS, library
+from ggxref.sampling import slope_beckmann
 
 COUNT = 512
 LIMIT = 1e-4
@@ -84,6 +85,29 @@ def test_second_derivatives_of_a_direction():
         v = jnp.asarray([0.3, -0.2, 1.4])
         found = jax.jit(jax.hessian(lambda v: (jnp.stack(stable.unit(*v)) @ jnp.arange(1.0, 4.0)) ** 2))(v)
         np.testing.assert_allclose(found, jax.jit(jax.hessian(plain))(v), atol=1e-14)
+
+
+def test_second_derivative_of_a_length_beside_a_direction():
+    """`relative` is the ratio to a length that is held: differentiated twice, too."""
+
+    def held(t):
+        return stable.relative(t * t + 1, jnp.exp(t / 2) + 1)
+
+    with jax.enable_x64(True):
+        t = 0.7
+        unit = np.exp(t / 2) + 1
+        expected = jax.hessian(lambda t: unit * (t * t + 1) / (jnp.exp(t / 2) + 1))(t)
+        np.testing.assert_allclose(jax.hessian(held)(t), expected, rtol=1e-14)
+
+
+def test_derivative_of_a_beckmann_sample_far_below_the_horizon():
+    """By u it is a quotient of Gaussians that float32 does not hold; 0 before."""
+    wi, alpha = np.array([0.7, 0, -0.714]) / np.hypot(0.7, 0.714), np.array([0.1, 0.1])
+    slopes = jax.jit(jax.jacfwd(slope_beckmann.sample))
+    found = slopes(*(jnp.asarray(x, jnp.float32) for x in ([0.3, 0.4], wi, alpha)))
+    with jax.enable_x64(True):
+        low, high = (jax.jit(slope_beckmann.sample)(np.array([u, 0.4]), wi, alpha) for u in (0.3 - 1e-6, 0.3 + 1e-6))
+    np.testing.assert_allclose(found[:, 0], (np.asarray(high) - np.asarray(low)) / 2e-6, atol=1e-7)
 
 
 brdf_slopes = jax.jit(jax.grad(bsdf.brdf_ggx, argnums=(0, 1, 2)))

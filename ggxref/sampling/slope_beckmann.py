@@ -96,16 +96,20 @@ def _quantile(u: Scalar, s: Scalar, c: Scalar) -> Scalar:
 
 @_quantile.defjvp
 def _quantile_jvp(primals, tangents):
-    """By the implicit function theorem on survival(a; s, c) = u · total(s, c)."""
+    """By the implicit function theorem on survival(a; s, c) = u · total(s, c), all times exp(floor²) as in the value."""
     (u, s, c), (du, ds, dc) = primals, tangents
     a = _quantile(u, s, c)
     edge = c / jnp.where(s > 0, s, 1)
-    root_pi = math.sqrt(math.pi)
-    at_edge_s = jnp.where(s > 0, jnp.exp(-edge * edge) / root_pi, 0)
-    at_edge_c = jnp.where(s > 0, erfc(-edge), 2)
-    total = s * at_edge_s + c * at_edge_c
-    density = _DENSITY * (s * a + c) * jnp.exp(-a * a)
-    change = (jnp.exp(-a * a) / root_pi - u * at_edge_s) * ds + (erfc(a) - u * at_edge_c) * dc - total * du
+    below, floor = edge < 0, jnp.maximum(-edge, 0)
+    tail_edge, area_edge = _special.gaussian_tails(jnp.abs(edge))
+    gauss_edge = jnp.where(below, 1, jnp.exp(-edge * edge))
+    at_edge_s = jnp.where(s > 0, gauss_edge / math.sqrt(math.pi), 0)
+    at_edge_c = jnp.where(s > 0, jnp.where(below, tail_edge, erfc(-edge)), 2)
+    total = 2 * jnp.maximum(c, 0) + s * area_edge * gauss_edge
+    gauss = jnp.exp((floor - a) * (floor + a))
+    survival = jnp.where(a > 0, _special.gaussian_tails(jnp.abs(a))[0] * gauss, erfc(a))
+    density = _DENSITY * (s * a + c) * gauss
+    change = (gauss / math.sqrt(math.pi) - u * at_edge_s) * ds + (survival - u * at_edge_c) * dc - total * du
     return a, jnp.where(density > 0, change / jnp.where(density > 0, density, 1), 0)
 
 
