@@ -85,7 +85,8 @@ def conductor(cos_i: Real, eta: Real, k: Real) -> Scalar:
 @jax.custom_jvp
 def _conductor(cosine, eta, k):
     c = jnp.abs(cosine)
-    c_square, sin_square = c * c, (1 - c) * (1 + c)
+    c_square = c * c
+    sin_square = 1 - c_square  # (1 - c)(1 + c) has digits that F does not need, and a loop of its own
     # N = η + ik, a + ib = √(N² − sin²θ); what is left of cancelling sums is r_s = (1 − N²)/(c + a + ib)².
     gap, imaginary = (eta - 1) * (eta + 1) - k * k, 2 * eta * k
     real = jnp.where(c_square > 0.5, (eta - k) * (eta + k) - sin_square, gap + c_square)
@@ -100,8 +101,9 @@ def _conductor(cosine, eta, k):
     scale = reciprocal_scale(total)
     r_s = (gap * gap + imaginary * imaginary) * scale * scale
     denominator = (total * scale) ** 2 * ((W + twice * sin_square) * scale)
-    F = r_s * (W * scale) / denominator
-    return jnp.where(denominator <= 0, 0, jnp.where(F > 1, 1, F))
+    reflected = r_s * (W * scale)
+    reflected = jnp.where(reflected > denominator, denominator, reflected)  # F is 1 at most, but for rounding
+    return jnp.where(denominator <= 0, 0, reflected / denominator)
 
 
 @_conductor.defjvp
