@@ -41,6 +41,12 @@ def two_sum(a, b):
     return s, (a - (s - t)) + (b - t)
 
 
+def fast_two_sum(a, b):
+    """As `two_sum`, where `a` is the larger one (Dekker 1971)."""
+    total = a + b
+    return total, b - (total - a)
+
+
 @traced_once
 def quotient(x, a):
     """`x / a`, rounded, and the rest to within ε²."""

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
-from ggxref._errorfree import two_product
+from ggxref._errorfree import fast_two_sum, two_product
 from ggxref._types import Real, Scalar
 
 
@@ -188,12 +188,6 @@ _NEAR_POWERS, _FAR_POWERS = _powers(_KEPLER_NEAR, 7), _powers(_KEPLER_FAR, 11)
 _CBRT = {jnp.dtype("float32"): (jnp.int32, 0x54A2328C, 2), jnp.dtype("float64"): (jnp.int64, 0x553EF0FF289DD796, 3)}
 
 
-def _fast_two_sum(a, b):
-    """As `two_sum`, where `a` is the larger one (Dekker 1971)."""
-    total = a + b
-    return total, b - (total - a)
-
-
 def _cbrt(x):
     r"""$\sqrt[3]x$ for 0 <= x <= 1, and what its rounding left out: XLA's is a power."""
     integer, magic, steps = _CBRT[x.dtype]
@@ -208,7 +202,7 @@ def _cbrt(x):
     product, product_rest = two_product(root, inverse)
     # x inverse³ is 1 but for three times the error of the inverse.
     off = (1 - product) - (product_rest + (rest + x * square_rest) * inverse)
-    return _fast_two_sum(root * scale, (rest + x * square_rest + root * off * (2 / 3)) * scale)
+    return fast_two_sum(root * scale, (rest + x * square_rest + root * off * (2 / 3)) * scale)
 
 
 def _odd(series, x, rest, t):
@@ -216,7 +210,7 @@ def _odd(series, x, rest, t):
     first = x.dtype.type(series[0])
     value, error = two_product(x, jnp.asarray(first))
     others = _horner([series[0] - float(first), *series[1:]], t)
-    return _fast_two_sum(value, x * others + (rest * series[0] + error))
+    return fast_two_sum(value, x * others + (rest * series[0] + error))
 
 
 @jax.custom_jvp
