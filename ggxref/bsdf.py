@@ -12,7 +12,6 @@ from jaxtyping import Bool
 
 from ggxref import geometry, jacobian, stable
 from ggxref._types import Real, Scalar, Vec2, Vec3
-from ggxref.ellipsoid import length, reciprocal_scale
 
 
 def _over(numerator, denominator):
@@ -38,6 +37,7 @@ def brdf_ggx(wi: Vec3, wo: Vec3, alpha: Vec2, *, add: Callable = stable.evened_s
     $q = (h_x^2/\alpha_x^2 + h_y^2/\alpha_y^2 + h_z^2)/\|h\|^2$, $A = \mathrm{diag}(\alpha_x, \alpha_y, 1)$.
 
     - `wi`, `wo`: unit, (3,); 0 unless both are above the horizon. `alpha`: positive, (2,).
+    - In float32, $\omega_i + \omega_o$ from 1e-18 (0 below that), α from 1e-8.
     - `add`: the form of $\omega_i + \omega_o$. `stable.unit_sum` errs by no more than 16 ulp in all, for half as much time again.
     - F's cosine, $\omega_i\cdot\omega_h$, is $\|h\|/2$.
     - Its gradient is cut to the end of the dtype's range, which it leaves towards the horizon.
@@ -50,9 +50,8 @@ def brdf_ggx(wi: Vec3, wo: Vec3, alpha: Vec2, *, add: Callable = stable.evened_s
 
 
 class _Mirrored(NamedTuple):
-    h: tuple[Scalar, Scalar, Scalar]  # ωi + ωo, scaled by a power of two
-    scale: Scalar
-    square: Scalar  # of the scaled h
+    h: tuple[Scalar, Scalar, Scalar]  # ωi + ωo
+    square: Scalar  # ‖h‖²
     stretched: Scalar  # q times that
     length_i: Scalar
     length_o: Scalar
@@ -62,22 +61,20 @@ class _Mirrored(NamedTuple):
 
 def _mirrored(add, wi, wo, alpha):
     x, y, z = add(wi, wo)
-    # The quotient q knows no length of h, whose squares may underflow near the horizon.
-    scale = reciprocal_scale(jnp.abs(x) + jnp.abs(y) + jnp.abs(z))
-    x, y, z = x * scale, y * scale, z * scale
     square = x * x + y * y + z * z
-    unseen = (wi[2] <= 0) | (wo[2] <= 0) | (square <= 0)  # a NaN is not
     stretched = (x / alpha[0]) ** 2 + (y / alpha[1]) ** 2 + z * z
-    length_i, length_o = (length(alpha[0] * w[0], alpha[1] * w[1], w[2]) for w in (wi, wo))
+    unseen = (wi[2] <= 0) | (wo[2] <= 0) | (square <= 0)  # a NaN is not
+    # The rule below knows their derivatives: no need of a root that guards its own.
+    length_i, length_o = (jnp.sqrt(w[2] ** 2 + ((alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2)) for w in (wi, wo))
     between = wo[2] * length_i + wi[2] * length_o
-    return _Mirrored((x, y, z), scale, square, stretched, length_i, length_o, between, unseen)
+    return _Mirrored((x, y, z), square, stretched, length_i, length_o, between, unseen)
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(0,))
 def _brdf_ggx(add, wi, wo, alpha):
     m = _mirrored(add, wi, wo, alpha)
-    inverse = (2 * math.pi * alpha[0]) * m.stretched * (alpha[1] * m.stretched) * m.between
-    return jnp.where(m.unseen, 0, m.square * m.square / inverse)
+    over_q = m.square / m.stretched  # a quotient of its own: the squares of both may underflow
+    return jnp.where(m.unseen, 0, over_q * over_q / (2 * math.pi * alpha[0] * alpha[1] * m.between))
 
 
 @_brdf_ggx.defjvp
@@ -96,7 +93,7 @@ def _brdf_ggx_jvp(add, primals, tangents):
     terms = []
     for c, dc, a, da in zip(m.h, dh, factors, (*dalpha, none), strict=True):
         p = c / a
-        terms.append((-4 * (value / q) * ((p / a - q * c) / square) * m.scale, dc))
+        terms.append((-4 * (value / q) * ((p / a - q * c) / square), dc))
         terms.append((value / a * (4 * (p * p / stretched) - 1), da))
     for w, dw, z, own, other in ((wi, di, wo[2], m.length_i, m.length_o), (wo, do, wi[2], m.length_o, m.length_i)):
         part = -value * (z / between) / jnp.where(own > 0, own, 1)

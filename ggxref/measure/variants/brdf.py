@@ -29,7 +29,12 @@ def half_plain(wi, wo):
 
 def conductor_of_sum(wi, wo):
     """F, whose cosine is ‖ω_i + ω_o‖/2: near 1 at grazing angles, where the sum loses digits."""
-    return fresnel.conductor(jnp.sqrt(sum(c * c for c in plain_sum(wi, wo))) / 2, ETA, K)
+    return _conductor_of_sum(wi, wo, ETA, K)
+
+
+def _conductor_of_sum(wi, wo, eta, k):
+    square = sum(c * c for c in plain_sum(wi, wo))
+    return fresnel.conductor(jnp.sqrt(square) / 2, eta, k, square=square / 4)
 
 
 def one_expression(wi, wo, alpha):
