@@ -6,8 +6,7 @@ One core: on two, what a virtual machine's host takes from either makes a loop i
 
 float32, one material (α = 0.3, 0.1), all kernels of a size in one interleaved run, vectors as three arrays (Mitsuba's way)
 but in the row that says otherwise. Errors are the largest that sampling and
-search find in all regions. Mitsuba's `sample` returns the density too, and its conductor has three bands. Needs an idle
-machine; the extra `peers` for Mitsuba's columns.
+search find in all regions. Mitsuba's `sample` returns the density too. Needs an idle machine; the extra `peers` for Mitsuba's columns.
 """
 
 import sys
@@ -19,15 +18,17 @@ import jax.numpy as jnp
 from ggxref import masking, ndf, stable
 from ggxref.files import write_atomically
 from ggxref.measure import peers, speed
-from ggxref.measure.accuracy import measure
+from ggxref.measure.accuracy import arguments, measure
 from ggxref.measure.reference import REFERENCES
 from ggxref.measure.regions import REGIONS
 from ggxref.measure.variants import QUANTITIES
+from ggxref.measure.variants.brdf import one_expression, three_bands
 from ggxref.measure.variants.directions import cap_uncorrected
 from ggxref.sampling import bounded_cap, cross_section, spherical_cap
 from ggxref.sampling._sphere import half_in_cap, ray
 
-PACKED = "the same, packed in one array"
+PACKED, WIDE = "the same, packed in one array", "the same, vectors of 512 bits"
+DIFFERENTLY = {PACKED: {"apart": False}, WIDE: {"options": {"xla_cpu_prefer_vector_width": 512}}}
 MARKS = "<!-- kernels: experiments/kernels.py -->\n", "<!-- end kernels -->\n"
 SIZES = (1 << 16, 1 << 18, 1 << 20)
 POINTS = 1 << 15
@@ -44,6 +45,7 @@ GROUPS = (
     {
         "spherical_cap.sample": (spherical_cap.sample, "mitsuba sample", "sampling.spherical_cap.sample"),
         PACKED: (spherical_cap.sample, "mitsuba sample", "sampling.spherical_cap.sample"),
+        WIDE: (spherical_cap.sample, "mitsuba sample", "sampling.spherical_cap.sample"),
         "the same, a loop for each component": (cap_apart, "mitsuba sample", "sampling.spherical_cap.sample"),
         "the same, plain sum": (cap_uncorrected, "mitsuba sample", "sampling.spherical_cap.sample"),
         "bounded_cap.sample": (bounded_cap.sample, "mitsuba sample", "sampling.bounded_cap.sample"),
@@ -52,7 +54,12 @@ GROUPS = (
     {"spherical_cap.pdf": (spherical_cap.pdf, "mitsuba pdf", "sampling.spherical_cap.pdf")},
     {"ndf.ggx": (ndf.ggx, "mitsuba eval", "ndf.ggx")},
     {"masking.g1_ggx": (masking.g1_ggx, "", "masking.g1_ggx")},
-    {f"conductor, {v.name}": (v.function, "mitsuba conductor", "brdf") for v in QUANTITIES["brdf"].variants},
+    {
+        "conductor, one expression": (one_expression, "mitsuba conductor", "brdf"),
+        WIDE: (one_expression, "mitsuba conductor", "brdf"),
+        "conductor, three bands": (three_bands, "mitsuba conductor, three bands", ""),
+    }
+    | {f"conductor, {v.name}": (v.function, "mitsuba conductor", "brdf") for v in QUANTITIES["brdf"].variants},
     {f"half vector, {v.name}": (v.function, "", "half") for v in QUANTITIES["half"].variants},
 )
 
@@ -63,10 +70,10 @@ def times(group: dict) -> dict[str, list[tuple[speed.Timing, float | None, float
     for size in SIZES:
         wanted = {theirs for _, theirs, _ in group.values()}
         others = {name: call for name, call in peers.mitsuba(size).items() if name in wanted}
-        if PACKED in group:
-            args = speed.inputs(("u", "wi", "alpha"), size)
-            others[PACKED] = speed.subject(group[PACKED][0], args, apart=False)
-        ours = {name: f for name, (f, _, _) in group.items() if name != PACKED}
+        for name in group.keys() & DIFFERENTLY.keys():
+            args = speed.inputs(arguments(group[name][0]), size)
+            others[name] = speed.subject(group[name][0], args, **DIFFERENTLY[name])
+        ours = {name: f for name, (f, _, _) in group.items() if name not in DIFFERENTLY}
         runs = speed.throughput(ours, size, seconds=4, peers=others)
         ran = {t.subject: t for t in runs}
         for name, (_, theirs, _) in group.items():
@@ -77,6 +84,8 @@ def times(group: dict) -> dict[str, list[tuple[speed.Timing, float | None, float
 
 def error(f: Callable, name: str) -> str:
     """p99.9 and the largest error of a kernel over all regions; its reference is a public function's or a quantity's."""
+    if not name:
+        return "| "
     reference = REFERENCES[name] if name in REFERENCES else QUANTITIES[name].reference
     graded = [measure(name, "", f, reference, region=region, count=POINTS, rounds=4) for region in REGIONS]
     unit = "ulp" if graded[0].unit == "ulp" else "× 2⁻²⁴"

@@ -6,9 +6,11 @@ from glob import glob
 
 import numpy as np
 
+from ggxref.measure.variants.brdf import BANDS, ETA, K
+
 
 def mitsuba(points: int, alpha: tuple[float, float] = (0.3, 0.1), seed: int = 0) -> dict[str, Callable[[], object]]:
-    """Mitsuba's GGX: sample (direction and density), eval, pdf, and its rough conductor; empty if it cannot run.
+    """Mitsuba's GGX: sample (direction and density), eval, pdf, and its rough conductor of one index and of three; empty if it cannot run.
 
     It needs the package `mitsuba` and an LLVM library (Debian: libllvm19), found by itself or by DRJIT_LIBLLVM_PATH.
     """
@@ -35,9 +37,14 @@ def _subjects(mi, dr, points, alpha, rng):
     u, wi, wo = mi.Point2f(rng.random((2, points)).astype(np.float32)), directions(), directions()
     wm = directions()
     ggx = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, *alpha, True)
-    conductor = mi.load_dict(
-        {"type": "roughconductor", "distribution": "ggx", "alpha_u": alpha[0], "alpha_v": alpha[1]}
-    )
+
+    def conductor(kind, eta, k):
+        optics = {name: {"type": kind, "value": value} for name, value in (("eta", eta), ("k", k))}
+        surface = {"type": "roughconductor", "distribution": "ggx", "alpha_u": alpha[0], "alpha_v": alpha[1]}
+        return mi.load_dict(surface | optics)
+
+    # Of a "uniform" index Dr.Jit evaluates F once, though the variant has three bands.
+    grey, metal = conductor("uniform", ETA, K), conductor("rgb", *map(list, zip(*BANDS, strict=True)))
     at = dr.zeros(mi.SurfaceInteraction3f, points)
     at.wi = wi
     dr.eval(u, wi, wo, wm, at)
@@ -50,7 +57,8 @@ def _subjects(mi, dr, points, alpha, rng):
         "mitsuba sample": lambda: done(*ggx.sample(wi, u)),
         "mitsuba eval": lambda: done(ggx.eval(wm)),
         "mitsuba pdf": lambda: done(ggx.pdf(wi, wm)),
-        "mitsuba conductor": lambda: done(conductor.eval(mi.BSDFContext(), at, wo)),
+        "mitsuba conductor": lambda: done(grey.eval(mi.BSDFContext(), at, wo)),
+        "mitsuba conductor, three bands": lambda: done(metal.eval(mi.BSDFContext(), at, wo)),
     }
 
 

@@ -68,11 +68,14 @@ def components(arrays: object) -> object:
     return jax.tree.map(lambda a: list(a.reshape(-1, a.shape[-1])) if a.ndim > 1 else a, arrays)
 
 
-def subject(function: Callable, args: list, dtype: str = "f32", *, apart: bool = True) -> Compiled:
+def subject(
+    function: Callable, args: list, dtype: str = "f32", *, apart: bool = True, options: dict | None = None
+) -> Compiled:
     """A jitted `function`, mapped over the last axis of all `args` but "alpha".
 
     - `apart`: each component of arguments and result is an array of its own, as within a renderer's kernel and as Mitsuba
       holds them; otherwise a vector is one array, which the result must be packed into.
+    - `options`: XLA's, as `jax.jit` takes them for `compiler_options`.
     """
     names = arguments(function)
     axes = tuple(None if name == "alpha" else -1 for name in names)
@@ -86,7 +89,7 @@ def subject(function: Callable, args: list, dtype: str = "f32", *, apart: bool =
 
     with jax.enable_x64(dtype == "f64"):
         start = time.perf_counter()
-        program = jax.jit(run).lower(given).compile()
+        program = jax.jit(run).lower(given).compile(compiler_options=options)
         seconds = time.perf_counter() - start
     points = max(arg.shape[-1] for arg in args)
     sizes = program.memory_analysis()

@@ -9,6 +9,7 @@ from ggxref.measure.variants.form import Variant
 
 # Nearly silver at 550 nm, in numbers that every dtype holds: index and extinction.
 ETA, K = 0.125, 3.5
+BANDS = ((0.13, 4.0), (ETA, K), (0.15, 2.5))
 
 exact_half = reference.geometry_half_reflection
 
@@ -40,6 +41,12 @@ def _conductor_of_sum(wi, wo, eta, k):
 def one_expression(wi, wo, alpha):
     """The library's BRDF times F."""
     return bsdf.brdf_ggx(wi, wo, alpha) * conductor_of_sum(wi, wo)
+
+
+def three_bands(wi, wo, alpha):
+    """A renderer's: F of each band, in one pass over the points."""
+    found = bsdf.brdf_ggx(wi, wo, alpha)
+    return jnp.stack(stable.one_loop(*(found * _conductor_of_sum(wi, wo, eta, k) for eta, k in BANDS)))
 
 
 def exact_lengths(wi, wo, alpha):
@@ -79,4 +86,4 @@ BRDF = (
     Variant("one expression, plain", "ggxref.bsdf.brdf_ggx with the plain sum of the directions", plain),
 )
 
-__all__ = ["BRDF", "HALF", "exact_brdf", "exact_half"]
+__all__ = ["BRDF", "HALF", "exact_brdf", "exact_half", "three_bands"]

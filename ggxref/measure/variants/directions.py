@@ -75,7 +75,7 @@ TURN = (
     Variant("3 terms", "Taylor, x⁵ and x⁴", _polynomial(3)),
 )
 CAP = (
-    Variant("perpendicular", "ggxref.sampling.spherical_cap.sample", spherical_cap.sample),
+    Variant("corrected", "ggxref.sampling.spherical_cap.sample", spherical_cap.sample),
     Variant("plain sum", "ggxref.sampling.spherical_cap.sample without the correction of o' + i'", cap_uncorrected),
     Variant("printed", "dupuy2023 listing 3", cap_printed),
 )
