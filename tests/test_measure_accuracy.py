@@ -1,5 +1,7 @@
 """Properties: an ulp is an ulp; errors put in are found again; faults are counted; ill-conditioning is told from a bad form."""
 
+from fractions import Fraction
+
 import jax.numpy as jnp
 import ml_dtypes
 import numpy as np
@@ -57,6 +59,15 @@ def test_ill_conditioned_input_is_told_from_an_unstable_form():
     drawn = rounded(REGIONS["perpendicular"](np.random.default_rng(1), 256), np.float32)
     explained = box(q.reference, [drawn["wi"], drawn["wm"]], np.float32)
     assert np.median(explained) > 10  # half an ulp of the input is many of the result
+
+
+@pytest.mark.parametrize("name", REGIONS)
+def test_directions_in_float64_are_unit_but_for_their_rounding(name):
+    """Each component within half an ulp, at most 2⁻⁵⁴, of an exactly unit vector's: its length within √3 of that, and long double's own."""
+    drawn = rounded(REGIONS[name](np.random.default_rng(1), 256), np.float64)
+    for direction in ("w", "wo", "wm"):
+        squares = [sum(Fraction(float(c)) ** 2 for c in w) for w in drawn[direction].T]
+        assert max(abs(square - 1) / 2 for square in squares) < (np.sqrt(3) + 0.01) * 2.0**-54
 
 
 def test_search_finds_worse_than_sampling():

@@ -15,7 +15,7 @@ import ml_dtypes
 import numpy as np
 
 from ggxref.measure.doubledouble import DD
-from ggxref.measure.regions import DIRECTIONS, REGIONS, Points, rounded
+from ggxref.measure.regions import REGIONS, Points, rounded
 
 DTYPES: dict[str, Any] = {"f64": np.float64, "f32": np.float32, "bf16": ml_dtypes.bfloat16, "f16": np.float16}
 BLOCK = 1 << 13  # double-double temporaries of one block stay in the second-level cache
@@ -172,13 +172,11 @@ def errors(run: Callable, reference: Callable, args, dtype) -> tuple[np.ndarray,
 
 
 def _mutated(points: Points, rng) -> Points:
-    """Points near the given ones: each by its own relative step, directions unit again."""
+    """Points near the given ones, each by its own relative step; `rounded` makes directions unit again."""
     n = next(iter(points.values())).shape[-1]
     scale = 2.0 ** rng.uniform(-24, -2, n)
     moved = {k: p.astype(np.float64) * (1 + scale * rng.normal(size=p.shape)) for k, p in points.items()}
     for name in moved:
-        if name in DIRECTIONS:
-            moved[name] = moved[name] / np.sqrt((moved[name] ** 2).sum(0))
         if name in ("u", "f0", "g1_i", "g1_o", "x"):
             moved[name] = np.clip(moved[name], 0, 1)
         if name == "cos_i":
