@@ -133,7 +133,9 @@ def _conductor_slopes(cosine, eta, k):
     # Here V = N²c + t and N U, U = c + t, differ by d U sin², and |V|² and |N U|² by e |U|² sin².
     d = (1 - N) * (G / u) / (N * c + t)
     n_square, e = _square(N), 2 * jnp.real(N * jnp.conj(d)) + sin_square * _square(d)
-    sum_over = n_square * n_square + N * N + e * (2 * n_square + sin_square * e)
+    # At F's minimum, where |N| is large and c small, n⁴ and the rest cancel but for a difference of squares.
+    apart = (n_square + e - c * e) * (n_square + e + c * e)
+    sum_over = jnp.where(c < 0.5, apart, n_square * n_square + e * (2 * n_square + sin_square * e)) + N * N
     by_c = -2 * sin_square * _square(G / v / v) * jnp.real(sum_over / t)
     slopes = by_c * jnp.sign(cosine), jnp.real(by_N), -jnp.imag(by_N)
     by_c, by_eta, by_k = (jnp.where(critical, 0, x) for x in slopes)
