@@ -1,6 +1,7 @@
 """Special functions, where JAX has none or its own loses digits: each by a series or by Newton's method, in the dtype given."""
 
 import math
+from fractions import Fraction
 
 import jax
 import jax.numpy as jnp
@@ -140,6 +141,11 @@ def gaussian_tails(a: Real) -> tuple[Scalar, Scalar]:
     return jnp.where(small, direct, (1 / math.sqrt(math.pi) - scaled) / jnp.where(small, 1, a)), scaled
 
 
+# Taylor coefficients of (sin x − x)/x³ and (cos x − 1 + x²/2)/x⁴ in x².
+_SINE = [(-1) ** k / math.factorial(2 * k + 1) for k in range(1, 10)]
+_COSINE = [(-1) ** k / math.factorial(2 * k) for k in range(2, 11)]
+
+
 # Chebyshev coefficients of E/4π over w = v^(1/3), in 8 w² − 1, and of (π − E)/4π over d = 1/2 − v, in 128 d²/9 − 1: E of
 # `kepler`, up to v = 1/8 and from there on. tests/test_stable.py computes them again with arb.
 _KEPLER_NEAR = (
@@ -182,7 +188,28 @@ _KEPLER_FAR = (
     7.626422005656268e-18,
 )
 
-_NEAR_POWERS, _FAR_POWERS = _powers(_KEPLER_NEAR, 7), _powers(_KEPLER_FAR, 11)
+# What their first coefficients have beyond float64.
+_KEPLER_RESTS = 1.7946030696967673e-17, 1.7949918229824025e-17
+
+
+def _half_angle(chebyshev: tuple[float, ...], rest: float, terms: int) -> dict[jnp.dtype, list[float]]:
+    """The series of E/4π as one of E/2 in powers; the constant, which carries the digits, as a sum of two."""
+
+    def powers(series, dtype):
+        first = sum((-1) ** (k // 2) * Fraction(c) for k, c in enumerate(series) if k % 2 == 0) + Fraction(rest)
+        first *= Fraction(math.tau) + Fraction(_TAU_REST)
+        value = float(np.asarray(float(first)).astype(dtype))
+        others = [math.tau * c for c in np.polynomial.chebyshev.cheb2poly(series).tolist()[1:]]
+        return [value, float(first - Fraction(value)), *others]
+
+    sizes = {jnp.dtype("float32"): chebyshev[:terms], jnp.dtype("float64"): chebyshev}
+    return {dtype: powers(series, dtype) for dtype, series in sizes.items()}
+
+
+_NEAR, _FAR = (
+    _half_angle(series, rest, terms)
+    for series, rest, terms in zip((_KEPLER_NEAR, _KEPLER_FAR), _KEPLER_RESTS, (7, 11), strict=True)
+)
 
 # The bits of 1/∛x are these less a third of those of x, to within 4 %.
 _CBRT = {jnp.dtype("float32"): (jnp.int32, 0x54A2328C, 2), jnp.dtype("float64"): (jnp.int64, 0x553EF0FF289DD796, 3)}
@@ -206,11 +233,21 @@ def _cbrt(x):
 
 
 def _odd(series, x, rest, t):
-    """`x` times the series at `t`, of which all but the first coefficient are small, in two words."""
-    first = x.dtype.type(series[0])
-    value, error = two_product(x, jnp.asarray(first))
-    others = _horner([series[0] - float(first), *series[1:]], t)
-    return fast_two_sum(value, x * others + (rest * series[0] + error))
+    """`x` times the series at `t`, of which all but the constant are small, in two words."""
+    constant, constant_rest, *others = series
+    value, error = two_product(x, jnp.asarray(constant, x.dtype))
+    return fast_two_sum(value, x * (t * _horner(others, t) + constant_rest) + (rest * constant + error))
+
+
+def _cos_sin(angle, rest):
+    """Cosine and sine of an angle of two words in [0, 0.9]: what is not exact is small."""
+    wide = angle.dtype == jnp.float64
+    square, square_rest = two_product(angle, angle)
+    high = 1 - square / 2
+    lost = (1 - high) - square / 2
+    s = angle + (rest * high + angle * (square * _horner(_SINE[: 9 if wide else 5], square)))
+    c = high + (lost + (square * square * _horner(_COSINE[: 9 if wide else 5], square) - (square_rest / 2 + s * rest)))
+    return c, s
 
 
 @jax.custom_jvp
@@ -222,14 +259,11 @@ def kepler(v: Real) -> tuple[Scalar, Scalar]:
     function of the cube root of `v`, π − E one of 1/2 − v; the cosine takes its digits from the latter.
     """
     v = jnp.asarray(v)
-    near, far = _NEAR_POWERS[v.dtype], _FAR_POWERS[v.dtype]
     upper = v > 0.125
     (w, w_rest), d = _cbrt(jnp.where(upper, 0, v)), 0.5 - v
-    angles = _odd(near, w, w_rest, 8 * w * w - 1), _odd(far, d, 0.0, (128 / 9) * d * d - 1)
-    angle, rest = (jnp.where(upper, y, x) for x, y in zip(*angles, strict=True))
-    c, s = cos_sin_turn(angle)
-    rest = (2 * math.pi) * rest
-    c, s = c - s * rest, s + c * rest
+    near = _odd(_NEAR[v.dtype], w, w_rest, 8 * w * w - 1)
+    far = _odd(_FAR[v.dtype], d, (0.5 - d) - v, (128 / 9) * d * d - 1)
+    c, s = _cos_sin(*(jnp.where(upper, y, x) for x, y in zip(near, far, strict=True)))
     return jnp.where(upper, s, c), jnp.where(upper, c, s)
 
 

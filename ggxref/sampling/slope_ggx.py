@@ -2,10 +2,12 @@
 
 import jax
 import jax.numpy as jnp
+from jax import lax
 
 from ggxref import _special, stable
 from ggxref._types import Vec2, Vec3
-from ggxref.sampling._sphere import incident, unstretch
+from ggxref.ellipsoid import reciprocal_scale
+from ggxref.sampling._sphere import unstretch
 from ggxref.sampling._visible import pdf_ggx as pdf
 
 __all__ = ["pdf", "sample"]
@@ -25,39 +27,59 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
 
     heitz2014 (10)–(13), algorithm 4 (whose authors' code fitted the second inverse, walter2014 §4.2).
     """
-    i = incident(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
-    sin_psi, cos_psi = _along(u[0], i.z, stable.sqrt(i.x * i.x + i.y * i.y), i.rise, i.fall)
+    x, y, z = stable.turning(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
+    scale = reciprocal_scale(jnp.abs(x) + jnp.abs(y) + jnp.abs(z))
+    x, y, z = x * scale, y * scale, z * scale
+    square = x * x + y * y
+    flat = stable.sqrt(square)
+    sin_psi, cos_psi, length = _along(u[0], flat, z, square)
     upper = u[1] > 0.5
-    c, s = _special.kepler(jnp.where(upper, 1 - u[1], u[1]))
-    along, across = -sin_psi * s, jnp.where(upper, -c, c)
-    cos_i, sin_i = stable.azimuth(i.x, i.y)
-    return unstretch(cos_i * along - sin_i * across, sin_i * along + cos_i * across, cos_psi * s, alpha)
+    # In a loop of their own: each component that takes them would compute them again.
+    c, s = stable.one_loop(*_special.kepler(jnp.where(upper, 1 - u[1], u[1])))
+    along, across = -sin_psi * s, length * jnp.where(upper, -c, c)
+    cos_i, sin_i, one = _azimuth(x, y, flat)
+    return unstretch(cos_i * along - sin_i * across, sin_i * along + cos_i * across, one * (cos_psi * s), alpha)
 
 
-def _cosine(u, z, rise, fall):
-    """cos(ψ + θ)."""
-    return stable.sqrt((1 - u) * rise * (fall + u * rise))
+def _azimuth(x, y, flat):
+    """Cosine, sine and 1, all times `flat` times a power of two: nothing is divided, and nothing underflows."""
+    pole, scale = flat <= 0, reciprocal_scale(flat)
+    x, y = jnp.where(pole, 1, x * scale), jnp.where(pole, 0, y * scale)
+    x, y, _ = stable.turning(x, y, jnp.zeros_like(x))
+    return x, y, jnp.where(pole, 1, lax.stop_gradient(flat) * scale)
+
+
+def _parts(u, flat, z, square):
+    """‖v‖, ‖v‖ + z, cos(ψ + θ) ‖v‖ and (sin(ψ + θ) + cos θ) ‖v‖."""
+    norm = stable.sqrt(square + z * z)
+    large, below = norm + jnp.abs(z), z < 0
+    small = square / jnp.where(large > 0, large, 1)  # one of norm + z, norm - z cancels
+    rise, fall = jnp.where(below, small, large), jnp.where(below, large, small)
+    lower = u * rise
+    return norm, rise, stable.sqrt((1 - u) * rise * (fall + lower)), lower
 
 
 @jax.custom_jvp
-def _along(u, z, sin_theta, rise, fall):
-    """(sin ψ, cos ψ) at θ, of which are given the cosine, the sine, 1 + cos θ and 1 − cos θ."""
-    lower = u * rise  # sin(ψ + θ) + cos θ
-    sine, cosine = lower - z, _cosine(u, z, rise, fall)
+def _along(u, flat, z, square):
+    r"""$(\sin\psi, \cos\psi, 1)$ times $\|v\|^2$ of $v = \|v\|(\sin\theta, 0, \cos\theta)$, of which are given ‖v‖ sin θ, ‖v‖ cos θ
+    and the square of the former: each division would round once more."""
+    _, _, cosine, lower = _parts(u, flat, z, square)
+    sine, length = lower - z, square + z * z
     # cos ψ = cosine cos θ + sine sin θ; where the terms differ in sign, times its conjugate.
-    plus, minus = cosine * z, sine * sin_theta
+    plus, minus = cosine * z, sine * flat
     differ = ((plus > 0) & (minus < 0)) | ((plus < 0) & (minus > 0))
     conjugate = jnp.where(differ, plus - minus, 1)
-    return sine * z - cosine * sin_theta, jnp.where(differ, lower * (2 * z - lower) / conjugate, plus + minus)
+    cos_psi = jnp.where(differ, length * (lower * (2 * z - lower)) / conjugate, plus + minus)
+    return sine * z - cosine * flat, cos_psi, length
 
 
 @_along.defjvp
 def _along_jvp(primals, tangents):
-    """At fixed u, ψ turns back as θ turns, but for a share of the order of u: the two cancel."""
-    (u, z, sin_theta, rise, fall), (du, dz, dsin, _, _) = primals, tangents
-    sin_psi, cos_psi = _along(*primals)
-    cosine = _cosine(u, z, rise, fall)
+    """At fixed u, ψ turns back as θ turns, but for a share of the order of u: the two cancel. The length is left as it is."""
+    (u, flat, z, _), (du, dflat, dz, _) = primals, tangents
+    sin_psi, cos_psi, length = _along(*primals)
+    norm, rise, cosine, _ = _parts(*primals)
     cosine = jnp.where(cosine > 0, cosine, jnp.inf)
-    share = 2 * u * (1 - u) * (rise / cosine) / ((1 - u) * sin_theta + cosine)
-    turn = (rise / cosine) * du - share * (z * dsin - sin_theta * dz)
-    return (sin_psi, cos_psi), (cos_psi * turn, -sin_psi * turn)
+    share = 2 * u * (1 - u) * (rise / cosine) / ((1 - u) * flat + cosine)
+    turn = (rise / cosine) * du - share * norm * ((z * dflat - flat * dz) / length)
+    return (sin_psi, cos_psi, length), (cos_psi * turn, -sin_psi * turn, jnp.zeros_like(length))
