@@ -12,6 +12,7 @@ from ggxref.measure.accuracy import measure
 from ggxref.measure.reference import REFERENCES
 from ggxref.measure.tables import DRAWS, library
 from ggxref.measure.variants.brdf import plain_sum
+from ggxref.measure.variants.densities import fresnel_plain_root
 from ggxref.measure.variants.directions import cap_uncorrected
 from ggxref.sampling import _sphere, ellipsoid_bounded, ellipsoid_cap
 from ggxref.sampling.ellipsoid_cap import from_sphere, to_sphere
@@ -59,6 +60,13 @@ def plain_beckmann(wm, alpha):
 )
 def test_plain_sums_lose_them(name, function):
     assert found(name, function, "skew", rounds=0).p999 > 2 * LARGEST[name]
+
+
+@pytest.mark.parametrize("region", ["typical", "ordinals"])
+def test_dielectric_towards_the_critical_angle(region):
+    """There 1 − η² + (ηc)² cancels, and F goes with its root; by a plain sum it is wrong by hundreds or thousands of ulps."""
+    assert found("fresnel.dielectric", library("fresnel.dielectric"), region).worst < 15
+    assert found("fresnel.dielectric", fresnel_plain_root, region).worst > 150
 
 
 def plain_ellipsoid_cap(u, wi, A):

@@ -45,6 +45,15 @@ def fresnel_printed(cos_i, eta):
     return jnp.where(sin_square >= 1, 1, (s * s + p * p) / 2)
 
 
+def fresnel_plain_root(cos_i, eta):
+    """The library's, with c_t² = 1 − η² + (ηc)² by an ordinary sum."""
+    c, gap = jnp.abs(cos_i), (1 - eta) * (1 + eta)
+    square = gap + (eta * c) ** 2
+    ct = jnp.sqrt(jnp.maximum(square, 0))
+    s, p = gap / (eta * c + ct) ** 2, gap * (c * c - eta * eta * (1 - c) * (1 + c)) / (c + eta * ct) ** 2
+    return jnp.where(square <= 0, 1, (s * s + p * p) / 2)
+
+
 def fresnel_schlick(cos_i, eta):
     """F0 + (1 − F0)(1 − c)^5, F0 from η."""
     return fresnel.schlick(cos_i, ((eta - 1) / (eta + 1)) ** 2)
@@ -61,8 +70,9 @@ DOT = (
 )
 FRESNEL = (
     Variant("conjugate", "ggxref.fresnel.dielectric", fresnel.dielectric),
+    Variant("conjugate, plain root", "the same with 1 − η² + (ηc)² by an ordinary sum", fresnel_plain_root),
     Variant("printed", "Walter et al. 2007 (22), PBR book", fresnel_printed),
     Variant("Schlick", "Schlick 1994", fresnel_schlick, approximate=True),
 )
 
-__all__ = ["DOT", "FRESNEL", "PDF", "exact_dot", "exact_fresnel", "exact_pdf"]
+__all__ = ["DOT", "FRESNEL", "PDF", "exact_dot", "exact_fresnel", "exact_pdf", "fresnel_plain_root"]
