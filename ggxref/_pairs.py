@@ -89,9 +89,7 @@ def determinant(A: Mat3) -> Pair:
 @jax.custom_jvp
 def tangent_square(x: Scalar, y: Scalar, z: Scalar, ax: Scalar, ay: Scalar) -> Pair:
     r"""$(x^2/\alpha_x^2 + y^2/\alpha_y^2)/z^2$, `z > 0`: an exponent, whose error is one of its exponential times as large."""
-    (p, p_rest), (q, q_rest) = quotient(x, ax), quotient(y, ay)
-    square, rest = dot((p, q), (p, q))
-    return _over((square, rest + 2 * (p * p_rest + q * q_rest)), dot((z,), (z,)))
+    return _over(square_of_pairs(quotient(x, ax), quotient(y, ay)), dot((z,), (z,)))
 
 
 @tangent_square.defjvp
@@ -103,12 +101,10 @@ def _tangent_square_jvp(primals, tangents):
     return (value, rest), (change, jnp.zeros_like(rest))
 
 
-def height_square(x: Scalar, y: Scalar, z: Scalar, ax: Scalar, ay: Scalar) -> Pair:
-    r"""$z^2/(\alpha_x^2 x^2 + \alpha_y^2 y^2)$, `x` and `y` not both 0: an exponent, without a derivative."""
-    (p, p_rest), (q, q_rest) = two_product(ax, x), two_product(ay, y)
-    square, rest = dot((p, q), (p, q))
-    value, rest = _over(dot((z,), (z,)), (square, rest + 2 * (p * p_rest + q * q_rest)))
-    return lax.stop_gradient(value), lax.stop_gradient(rest)
+def square_of_pairs(a: Pair, b: Pair) -> Pair:
+    """The sum of the two squares."""
+    value, rest = dot((a[0], b[0]), (a[0], b[0]))
+    return value, rest + 2 * (a[0] * a[1] + b[0] * b[1])
 
 
 def _over(a: Pair, b: Pair) -> Pair:
@@ -116,3 +112,17 @@ def _over(a: Pair, b: Pair) -> Pair:
     value = a[0] / b[0]
     product, error = two_product(value, b[0])
     return value, (((a[0] - product) - error) + (a[1] - value * b[1])) / b[0]
+
+
+def over(a: Pair, b: Pair, inverse: Scalar) -> Pair:
+    """As `_over`, with `inverse` for 1/b: products alone, which leave a loop whole."""
+    value = a[0] * inverse
+    product, error = two_product(value, b[0])
+    return value, (((a[0] - product) - error) + (a[1] - value * b[1])) * inverse
+
+
+def root(a: Pair, inverse: Scalar) -> Pair:
+    """The square root, with `inverse` for its inverse."""
+    value = a[0] * inverse
+    product, error = two_product(value, value)
+    return value, (((a[0] - product) - error) + a[1]) * (inverse / 2)

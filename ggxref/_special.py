@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
-from ggxref._errorfree import fast_two_sum, two_product
+from ggxref._errorfree import fast_two_sum, two_product, two_sum
 from ggxref._types import Real, Scalar
+from ggxref.stable import reciprocal
 
 
 def log1p(x: Scalar) -> Scalar:
@@ -38,6 +39,26 @@ def _powers(chebyshev: tuple[float, ...], terms: int) -> dict[jnp.dtype, list[fl
     return {jnp.dtype("float32"): narrow, jnp.dtype("float64"): wide}
 
 
+def _two_word_powers(
+    chebyshev: tuple[float, ...], rest: float, factor: tuple[float, float], terms: int
+) -> dict[jnp.dtype, list[float]]:
+    """As `_powers`, times a factor; the constant, which carries the digits, as a sum of two, as the factor is.
+
+    - `rest`: what the first coefficient has beyond float64.
+    """
+
+    def powers(series, dtype):
+        # At t = 0 the polynomials are 1, 0, -1, 0, 1, ...
+        first = Fraction(rest) + sum((-1) ** (k // 2) * Fraction(c) for k, c in enumerate(series) if k % 2 == 0)
+        first *= Fraction(factor[0]) + Fraction(factor[1])
+        value = float(np.asarray(float(first)).astype(dtype))
+        others = [factor[0] * c for c in np.polynomial.chebyshev.cheb2poly(series).tolist()[1:]]
+        return [value, float(first - Fraction(value)), *others]
+
+    sizes = {jnp.dtype("float32"): chebyshev[:terms], jnp.dtype("float64"): chebyshev}
+    return {dtype: powers(series, dtype) for dtype, series in sizes.items()}
+
+
 def cos_sin_turn(u: Real, terms: int | None = None) -> tuple[Scalar, Scalar]:
     r"""$(\cos 2\pi u, \sin 2\pi u)$ for `u` in [0, 1].
 
@@ -62,70 +83,98 @@ def cos_sin_turn(u: Real, terms: int | None = None) -> tuple[Scalar, Scalar]:
     return jnp.where(negate_cos, -c, c), jnp.where(negate_sin, -s, s)
 
 
-# Chebyshev coefficients in t = (a - 3) / (a + 3) of sqrt(pi) (1 + 2 a^2) exp(a^2) ierfc(a), a smooth function that is
-# 1 at both ends of [0, inf). tests/test_stable.py computes them again with arb.
+# 1/k!, and ln 2 in two words, of which the first times an exponent is exact.
+_EXP = [1 / math.factorial(k) for k in range(2, 14)]
+_LN2 = {
+    jnp.dtype("float32"): (0.693145751953125, 1.428606820309417e-06),
+    jnp.dtype("float64"): (0.6931471803691238, 1.9082149292705877e-10),
+}
+
+
+def exp_minus(x: Real, rest: Real) -> tuple[Scalar, Scalar, Scalar]:
+    r"""$e^{-(x + \mathrm{rest})}$ as `(m + m_rest) * 2**-k`: (m, m_rest, k). XLA's own has an error of its own, and underflows."""
+    high, low = _LN2[x.dtype]
+    k = jnp.round(x * (1 / math.log(2)))
+    y, y_rest = k * high - x, k * low - rest
+    both = y + y_rest
+    m = 1 + y
+    curve = both * both * _horner(_EXP[:6] if x.dtype == jnp.float32 else _EXP, both)
+    return m, ((1 - m) + y) + (y_rest + curve), k
+
+
+def power_of_two(k: Real) -> Scalar:
+    """2**k of a whole number; 0 below the normal range."""
+    info = jnp.finfo(k.dtype)
+    integer = jnp.int32 if info.bits == 32 else jnp.int64
+    biased = jnp.maximum(k + (info.maxexp - 1), 0).astype(integer)
+    return lax.bitcast_convert_type(biased << info.nmant, k.dtype)
+
+
+# Chebyshev coefficients in t = (a - 3) / (a + 3) of sqrt(pi) (1 + sqrt(pi) a + 2 a^2) exp(a^2) ierfc(a), a smooth function
+# that is 1 at both ends of [0, inf), and flat at 0, where t has but the absolute precision of 1. tests/test_stable.py
+# computes them again with arb.
 _IERFC = (
-    0.8983020427745623,
-    0.11262785225761364,
-    0.03571305852948175,
-    -0.08726578763158488,
-    0.059453479214879104,
-    -0.02438560091618397,
-    0.006522770600882268,
-    -0.001005650624929731,
-    1.2794620962747412e-05,
-    2.978488482221082e-05,
-    -4.347826728577626e-06,
-    -6.093356111432701e-07,
-    2.10743212981155e-07,
-    1.1652759571892747e-08,
-    -9.038074775178108e-09,
-    -3.030761419449976e-10,
-    3.982604818145382e-10,
-    1.7577574077580366e-11,
-    -1.8236389678792617e-11,
-    -1.5040092030317944e-12,
-    8.316356698523843e-13,
-    1.2574718318109538e-13,
-    -3.4581066655988014e-14,
-    -9.476313500734717e-15,
-    1.0395855246885352e-15,
-    6.309879635822399e-16,
-    8.575482470432927e-18,
-    -3.562663873637638e-17,
-    -4.9147812293757106e-18,
-    1.4988660813585e-18,
+    1.076454505291804,
+    -0.01334871003563987,
+    -0.08953327017717706,
+    0.02356605395210076,
+    0.009379703391662228,
+    -0.009478842578515573,
+    0.0036571921672572793,
+    -0.0007562986582984636,
+    4.5761064363555275e-05,
+    1.804522886680375e-05,
+    -4.061765004093192e-06,
+    -2.480149041963323e-07,
+    1.7712104839134037e-07,
+    -3.494339044430806e-11,
+    -7.410135868977286e-09,
+    1.4456809387604993e-10,
+    3.31266244263937e-10,
+    -2.8359503477231995e-12,
+    -1.582132476173926e-11,
+    -4.629322776956003e-13,
+    7.707676032549949e-13,
+    7.096442064463471e-14,
+    -3.55128801378049e-14,
+    -6.728873301924289e-15,
+    1.3409783573360659e-15,
+    5.129096048426886e-16,
+    -2.09399041055519e-17,
+    -3.2431383422233466e-17,
+    -2.8189531838422533e-18,
 )
 
 
-_IERFC_POWERS = _powers(_IERFC, 16)
+_IERFC_REST = 1.0602091124949601e-16  # of the first, beyond float64
+_ROOT_PI, _ROOT_PI_REST = math.sqrt(math.pi), 1.453787399267733e-16
+_IERFC_POWERS = _powers(_IERFC, 13)
+_HALF_IERFC = _two_word_powers(_IERFC, _IERFC_REST, (0.28209479177387814, 3.83386490329147e-18), 13)  # over 2 sqrt(pi)
 
 
 def _ierfc_scaled(a):
     """exp(a²) ierfc(a) for a >= 0."""
-    return _horner(_IERFC_POWERS[a.dtype], (a - 3) / (a + 3)) / (math.sqrt(math.pi) * (1 + 2 * a * a))
+    return _horner(_IERFC_POWERS[a.dtype], (a - 3) / (a + 3)) / (_ROOT_PI * (1 + a * (_ROOT_PI + 2 * a)))
 
 
-@jax.custom_jvp
-def _ierfc(a, square, rest):
-    return _ierfc_scaled(a) * (jnp.exp(-square) * (1 - rest))
+def half_ierfc(a: Real, square: tuple[Real, Real]) -> tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar], Scalar]:
+    r"""Half the first repeated integral of erfc, $\int_a^\infty \mathrm{erfc} = e^{-a^2}/\sqrt\pi - a\,\mathrm{erfc}(a)$, for `a >= 0`, as a
+    quotient of numbers in two words times 2**-k: (numerator, denominator, k).
 
-
-@_ierfc.defjvp
-def _ierfc_jvp(primals, tangents):
-    return _ierfc(*primals), -jax.scipy.special.erfc(primals[0]) * tangents[0]
-
-
-def ierfc(a: Real, square: tuple[Real, Real] | None = None) -> Scalar:
-    r"""First repeated integral of erfc, $\int_a^\infty \mathrm{erfc} = e^{-a^2}/\sqrt\pi - a\,\mathrm{erfc}(a)$, for `a >= 0`.
-
-    This is the shape of every Gaussian projected area: Beckmann's Λ is `ierfc(a) / (2 a)`. The two terms agree in all
+    This is the shape of every Gaussian projected area: Beckmann's Λ is half `ierfc(a) / a`. The two terms agree in all
     but $1/2a^2$ of themselves, hence a Chebyshev series (after Shepherd & Laframboise 1981) times the exponential.
 
     - `square`: a² in two words: the rounding of `a` alone changes the exponential by 2a² times as much.
     """
-    a = jnp.asarray(a)
-    return _ierfc(a, *(square or (a * a, jnp.zeros_like(a))))
+    first, first_rest, *others = _HALF_IERFC[a.dtype]
+    t = 1 - 6 * reciprocal(a + 3)
+    series, series_rest = fast_two_sum(jnp.asarray(first, a.dtype), t * _horner(others, t) + first_rest)
+    m, m_rest, k = exp_minus(*square)
+    numerator, lost = two_product(m, series)
+    double, double_rest = two_sum(2 * square[0], jnp.ones_like(a))
+    denominator, denominator_rest = two_sum(double, a * _ROOT_PI)
+    rest = denominator_rest + (double_rest + (2 * square[1] + a * _ROOT_PI_REST))
+    return (numerator, lost + (m * series_rest + m_rest * series)), (denominator, rest), k
 
 
 # exp(a²) erfc(a) as a power series: up to a = 1/2 the first term left out is below half an ulp. The functions themselves
@@ -192,22 +241,8 @@ _KEPLER_FAR = (
 _KEPLER_RESTS = 1.7946030696967673e-17, 1.7949918229824025e-17
 
 
-def _half_angle(chebyshev: tuple[float, ...], rest: float, terms: int) -> dict[jnp.dtype, list[float]]:
-    """The series of E/4π as one of E/2 in powers; the constant, which carries the digits, as a sum of two."""
-
-    def powers(series, dtype):
-        first = sum((-1) ** (k // 2) * Fraction(c) for k, c in enumerate(series) if k % 2 == 0) + Fraction(rest)
-        first *= Fraction(math.tau) + Fraction(_TAU_REST)
-        value = float(np.asarray(float(first)).astype(dtype))
-        others = [math.tau * c for c in np.polynomial.chebyshev.cheb2poly(series).tolist()[1:]]
-        return [value, float(first - Fraction(value)), *others]
-
-    sizes = {jnp.dtype("float32"): chebyshev[:terms], jnp.dtype("float64"): chebyshev}
-    return {dtype: powers(series, dtype) for dtype, series in sizes.items()}
-
-
 _NEAR, _FAR = (
-    _half_angle(series, rest, terms)
+    _two_word_powers(series, rest, (math.tau, _TAU_REST), terms)  # of E/2
     for series, rest, terms in zip((_KEPLER_NEAR, _KEPLER_FAR), _KEPLER_RESTS, (7, 11), strict=True)
 )
 

@@ -31,8 +31,8 @@ def lambda_beckmann(w: Vec3, alpha: Vec2) -> Scalar:
 
     Smith 1967, in heitz2014 §2.1.
     """
-    s, tail = gaussian_tail(w, alpha)
-    return tail * (s / (2 * jnp.abs(w[2])))  # s tail may underflow where Λ does not
+    tail, scale = gaussian_tail(w, alpha)
+    return tail / jnp.abs(w[2]) * scale
 
 
 def _on_front(w, wm, g1):

@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 
 from ggxref import _pairs, _special, _squares, stable
+from ggxref._errorfree import two_product
 from ggxref._seen import area_ggx, over_beckmann, over_ggx
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import canonical, reciprocal_scale
@@ -144,16 +145,46 @@ def sigma_ggx(w: Vec3, alpha: Vec2) -> Scalar:
     return area_ggx(tuple(w), tuple(alpha), 1.0) / 2
 
 
+def _gaussian(x, y, z, ax, ay):
+    """a² and s in two words, and a: of a = z/s, s = ‖(αx x, αy y)‖."""
+    square = _pairs.square_of_pairs(two_product(ax, x), two_product(ay, y))
+    inverse = stable.rsqrt(square[0])
+    exponent = _pairs.over(_pairs.dot((z,), (z,)), square, inverse * inverse)
+    return exponent, _pairs.root(square, inverse), z * inverse
+
+
+@jax.custom_jvp
+def _tail(x, y, z, ax, ay):
+    """`s ierfc(z/s)/2` as a number and the exponent of 1/2 that it is to be multiplied with."""
+    exponent, (s, s_rest), a = _gaussian(x, y, z, ax, ay)
+    (top, top_rest), denominator, k = _special.half_ierfc(a, exponent)
+    product, lost = two_product(s, top)
+    numerator = product, lost + (s * top_rest + s_rest * top)
+    value, rest = _pairs.over(numerator, denominator, stable.reciprocal(denominator[0]))
+    return value + rest, k
+
+
+@_tail.defjvp
+def _tail_jvp(primals, tangents):
+    """By s it changes by exp(−a²)/2√π, by z by −erfc(a)/2."""
+    (x, y, _, ax, ay), (dx, dy, dz, dax, day) = primals, tangents
+    value, k = _tail(*primals)
+    exponent, (s, _), a = _gaussian(*primals)
+    m, m_rest, _ = _special.exp_minus(*exponent)
+    gauss = m + m_rest
+    ds = (ax * x * (ax * dx + x * dax) + ay * y * (ay * dy + y * day)) / s
+    change = gauss * (ds / (2 * math.sqrt(math.pi)) - _special.gaussian_tails(a)[0] * dz / 2)
+    return (value, k), (change, jnp.zeros_like(k))
+
+
 def gaussian_tail(w, alpha):
-    """`s = ‖(αx x, αy y)‖` and `ierfc(|z|/s)`, which is 0 at normal incidence: |z| Λ(w) is half their product."""
-    square = _squares.scaled_square(w, alpha)
-    s = jnp.sqrt(jnp.where(square <= 0, 1, square))
-    # From 30 on, ierfc is 0 in every dtype; the limit only stops the overflow of z/s at normal incidence.
-    a = jnp.minimum(jnp.abs(w[2]), 30 * s) / s
-    seen = ~((square <= 0) | (a >= 30))  # also NaN, which stays NaN
-    x, z = jnp.where(seen, w[0], 1), jnp.where(seen, w[2], 1)
-    exponent, rest = _pairs.height_square(x, jnp.where(seen, w[1], 1), z, alpha[0], alpha[1])
-    return s, jnp.where(seen, _special.ierfc(a, (exponent, rest)), 0)
+    """|z| Λ(w), 0 at normal incidence, as a number and a power of two: their product may underflow where Λ does not."""
+    x, y, z, ax, ay = w[0], w[1], jnp.abs(w[2]), alpha[0], alpha[1]
+    square = (ax * x) ** 2 + (ay * y) ** 2
+    # From a = 30 on, it is 0 in every dtype.
+    seen = ~((square < 4 * jnp.finfo(square.dtype).tiny) | (z * z >= 900 * square))  # also NaN, which stays NaN
+    value, k = _tail(*(jnp.where(seen, c, 1) for c in (x, y, z)), ax, ay)
+    return jnp.where(seen, value, 0), jnp.where(seen, _special.power_of_two(-k), 0)
 
 
 @stable.widened
@@ -162,8 +193,8 @@ def sigma_beckmann(w: Vec3, alpha: Vec2) -> Scalar:
 
     Underflows to 0 far below the horizon, where no slope is steep enough to be seen. heitz2014 §5.1 (c).
     """
-    s, tail = gaussian_tail(w, alpha)
-    return jnp.maximum(w[2], 0) + s * tail / 2
+    tail, scale = gaussian_tail(w, alpha)
+    return jnp.maximum(w[2], 0) + tail * scale
 
 
 def _factor(slope, wi):

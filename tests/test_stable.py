@@ -10,6 +10,7 @@ from flint import arb
 from library import numbers
 
 from ggxref import _special, _squares, ndf, stable
+from ggxref._errorfree import two_product
 from ggxref.oracle.precision import working
 from ggxref.sampling import ellipsoid_cap, normals
 
@@ -237,23 +238,52 @@ def chebyshev(function, count: int, nodes: int = 96) -> list[float]:
 
 
 def test_ierfc_coefficients():
-    """The Chebyshev series of √π (1 + 2a²) exp(a²) ierfc(a) in t = (a − 3)/(a + 3)."""
+    """The Chebyshev series of √π (1 + √π a + 2a²) exp(a²) ierfc(a) in t = (a − 3)/(a + 3), and the constants in two words."""
 
     def function(t):
         a = 3 * (1 + t) / (1 - t)
-        return arb.pi().sqrt() * (1 + 2 * a * a) * scaled_ierfc(a)
+        return arb.pi().sqrt() * (1 + arb.pi().sqrt() * a + 2 * a * a) * scaled_ierfc(a)
 
     with working(400):
         *true, first_left_out = chebyshev(function, len(_special._IERFC) + 1)
+        (rest,) = chebyshev(lambda t: function(t) - _special._IERFC[0], 1)
+        root_rest = float((arb.pi().sqrt() - _special._ROOT_PI).mid())
     np.testing.assert_allclose(_special._IERFC, true, rtol=1e-15, atol=1e-19)
+    np.testing.assert_allclose([_special._IERFC_REST, _special._ROOT_PI_REST], [rest, root_rest], rtol=1e-15)
     assert abs(first_left_out) < 2**-53
 
 
-def test_ierfc(dtype):
+def test_half_ierfc(dtype):
+    """a² in two words keeps the digits of the exponential; `a` alone, rounded, does not."""
     a = np.concatenate([rng().uniform(0, 9, N), [0.0]]).astype(dtype)
-    got = jax.jit(jax.vmap(_special.ierfc))(a)
-    for x, g, t in zip(a, got, exact(lambda a: scaled_ierfc(a) * (-a * a).exp(), a), strict=True):
-        assert ulps([g], [t], dtype) < 4 + x * x  # the exponential makes a²/2 ulp of the rounding of a², and of its own
+
+    def half(a, square):
+        (top, top_rest), (bottom, bottom_rest), k = _special.half_ierfc(a, square)
+        return (top + top_rest) / (bottom + bottom_rest) * _special.power_of_two(-k)
+
+    def graded(square):
+        return ulps(jax.jit(jax.vmap(lambda a: half(a, square(a))))(a), true, dtype)
+
+    true = exact(lambda a: scaled_ierfc(a) * (-a * a).exp() / 2, a)
+    assert graded(lambda a: two_product(a, a)) < 3  # the quotient and its two sums round, and `a` did
+    assert graded(lambda a: (a * a, jnp.zeros_like(a))) > 10
+
+
+def test_exponential_in_two_words(dtype):
+    """To the ends of the range and beyond, where the power of two is 0 and the rest is not."""
+    x = np.concatenate([rng().uniform(0, 80, N), [0.0, 80, 2000]]).astype(dtype)
+    rest = (rng().uniform(-0.5, 0.5, len(x)) * np.spacing(x)).astype(dtype)
+    m, m_rest, k = jax.jit(jax.vmap(_special.exp_minus))(x, rest)
+    scaled = exact(lambda x, r, k: (k * arb.const_log2() - x - r).exp(), x, rest, k)
+    with working(200):
+        error = max(abs(arb(float(a)) + float(b) - t) for a, b, t in zip(m, m_rest, scaled, strict=True))
+    assert error < 0.25 * epsilon(dtype)
+    np.testing.assert_array_equal(jax.vmap(_special.power_of_two)(-k)[-3:], [1, 2.0 ** -float(k[-2]), 0])
+
+
+def test_reciprocal(dtype):
+    x = np.exp(rng().uniform(-80, 80, N)).astype(dtype)
+    assert ulps(jax.jit(jax.vmap(stable.reciprocal))(x), exact(lambda x: 1 / x, x), dtype) <= 1
 
 
 def test_gaussian_tails(dtype):
