@@ -20,6 +20,7 @@ def _over(numerator, denominator):
     return jnp.where(denominator == 0, 0, numerator / safe)
 
 
+@stable.widened
 def brdf(wi: Vec3, wo: Vec3, D: Real, G2: Real, F: Real) -> Scalar:
     r"""$f_r = D\,G_2\,F / (4\,|\omega_i\cdot n||\omega_o\cdot n|)$ [1/sr]; 0 where either lies in the horizon.
 
@@ -104,6 +105,7 @@ def _brdf_ggx_jvp(add, primals, tangents):
     return value, jnp.where(m.unseen, 0, change)
 
 
+@stable.widened
 def btdf(wi: Vec3, wo: Vec3, n_i: Real, n_o: Real, D: Real, G2: Real, F: Real) -> Scalar:
     r"""$f_t = \frac{|\omega_i\cdot\omega_h||\omega_o\cdot\omega_h|}{|\omega_i\cdot n||\omega_o\cdot n|}
     \frac{n_o^2 (1-F) G_2 D}{(n_i\,\omega_i\cdot\omega_h + n_o\,\omega_o\cdot\omega_h)^2}$ [1/sr].
@@ -135,6 +137,7 @@ def weight_normals(wi: Vec3, wm: Vec3, G2: Real) -> Scalar:
     return jnp.where(z == 0, 0, jnp.abs(share) * G2)
 
 
+@stable.widened
 def weight_visible(g1_i: Real, g2: Real, F: Real) -> Scalar:
     r"""Weight of a sample from the visible normals: $F\,G_2/G_1(\omega_i)$ in [0, 1]; 0 where $G_1 = 0$.
 

@@ -78,6 +78,7 @@ def near_one(A: Mat3) -> tuple[Mat3, Scalar]:
     return A * scale, scale
 
 
+@stable.widened
 def shape_matrix(alpha: Vec2, angles: Vec3) -> Mat3:
     r"""$A = S R_x(\theta_x) R_y(\theta_y) R_z(\theta_z)$ with $S = \mathrm{diag}(\alpha_x, \alpha_y, 1)$.
 
@@ -205,6 +206,7 @@ def to_slopes(A: Mat3) -> tuple[Vec2, Mat2]:
     return -jnp.stack([ex, ey]), jnp.stack([jnp.stack([xx, xy]), jnp.stack([xy, yy])])
 
 
+@stable.widened
 def sggx(A: Mat3) -> Mat3:
     r"""The SGGX microflake matrix of the same ellipsoid, $S = A^T A$: (3, 3), symmetric. walter2014 §5.2."""
     columns = A.T

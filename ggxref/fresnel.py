@@ -162,6 +162,7 @@ def _square(x):
     return jnp.real(x) ** 2 + jnp.imag(x) ** 2
 
 
+@stable.widened
 def schlick(cos_i: Real, f0: Real) -> Scalar:
     r"""Schlick's approximation: $F = F_0 + (1 - F_0)(1 - |c|)^5$.
 

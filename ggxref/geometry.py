@@ -7,6 +7,7 @@ from ggxref import stable
 from ggxref._types import Mat3, Real, Vec3
 
 
+@stable.widened
 def reflect(w: Vec3, wm: Vec3) -> Vec3:
     r"""Mirror direction of `w` about the micronormal: $\omega_o = 2(\omega \cdot \omega_m)\,\omega_m - \omega$.
 
@@ -18,6 +19,7 @@ def reflect(w: Vec3, wm: Vec3) -> Vec3:
     return jnp.stack(stable.one_loop(*(twice * m - x for x, m in zip(w, wm, strict=True))))
 
 
+@stable.widened
 def refract(w: Vec3, wm: Vec3, eta: Real) -> Vec3:
     r"""Direction transmitted through a microfacet:
     $\omega_o = (\eta c - \mathrm{sgn}(c)\sqrt{1 + \eta^2 (c^2 - 1)})\,\omega_m - \eta\,\omega$, $c = \omega \cdot \omega_m$.
@@ -37,6 +39,7 @@ def refract(w: Vec3, wm: Vec3, eta: Real) -> Vec3:
     return jnp.stack(stable.one_loop(x, y, z))
 
 
+@stable.widened
 def half_reflection(wi: Vec3, wo: Vec3) -> Vec3:
     r"""The micronormal that reflects `wi` to `wo`: $\omega_h = (\omega_i + \omega_o)/\|\omega_i + \omega_o\|$.
 
@@ -47,6 +50,7 @@ def half_reflection(wi: Vec3, wo: Vec3) -> Vec3:
     return stable.direction(*stable.unit_sum(wi, wo))
 
 
+@stable.widened
 def half_refraction(wi: Vec3, wo: Vec3, n_i: Real, n_o: Real) -> Vec3:
     r"""The micronormal that refracts `wi` to `wo`, on the upper side:
     $\omega_h = \pm (n_i \omega_i + n_o \omega_o)/\|n_i \omega_i + n_o \omega_o\|$ with $\omega_h \cdot n \ge 0$.
@@ -81,6 +85,7 @@ def _between_jvp(primals, tangents):
     return wm, turned + across * (n_i * dn_o - n_o * dn_i)
 
 
+@stable.widened
 def basis(w: Vec3) -> Mat3:
     """Orthonormal frame about `w`: the rows (t, b, w), right-handed, so that `basis(w) @ v` are v's coordinates.
 

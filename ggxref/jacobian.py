@@ -8,6 +8,7 @@ from ggxref._types import Mat3, Real, Scalar, Vec3
 from ggxref.ellipsoid import determinant, near_one, times_exactly
 
 
+@stable.widened
 def reflection(wo: Vec3, wm: Vec3) -> Scalar:
     r"""$\|\partial\omega_h/\partial\omega_o\| = 1/(4|\omega_o \cdot \omega_m|)$: density of `wo` over density of `wm`.
 
@@ -18,6 +19,7 @@ def reflection(wo: Vec3, wm: Vec3) -> Scalar:
     return 1 / (4 * jnp.abs(stable.cosine(wo, wm)))
 
 
+@stable.widened
 def refraction(wi: Vec3, wo: Vec3, wm: Vec3, n_i: Real, n_o: Real) -> Scalar:
     r"""$\|\partial\omega_h/\partial\omega_o\| = n_o^2|\omega_o\cdot\omega_m| / (n_i\,\omega_i\cdot\omega_m + n_o\,\omega_o\cdot\omega_m)^2$.
 
@@ -48,6 +50,7 @@ def _spread_jvp(primals, tangents):
     return value, jnp.where(jnp.isinf(value), 0, along * do + rest)
 
 
+@stable.widened
 def slope(wm: Vec3) -> Scalar:
     r"""$\|\partial\tilde m/\partial\omega_m\| = 1/(\omega_m\cdot n)^3$: slope area over solid angle.
 

@@ -126,6 +126,7 @@ def _correlated_jvp(primals, tangents):
     return _correlated(*primals), (g1_o / denominator) ** 2 * di + (g1_i / denominator) ** 2 * do
 
 
+@stable.widened
 def g2_height_correlated(g1_i: Real, g1_o: Real) -> Scalar:
     r"""Smith's G2 with correlated heights: $G_iG_o/(G_i + G_o - G_iG_o)$, for reflection; 0 where both are 0.
 
@@ -134,6 +135,7 @@ def g2_height_correlated(g1_i: Real, g1_o: Real) -> Scalar:
     return _correlated(*stable.floats(g1_i, g1_o))
 
 
+@stable.widened
 def g2_v_cavity(wi: Vec3, wo: Vec3, wm: Vec3) -> Scalar:
     r"""G2 of V-cavities: $\min(G_1, G_1')$ for reflection ($\omega_o\cdot n > 0$), $\max(G_1 + G_1' - 1, 0)$ for transmission.
 

@@ -8,6 +8,7 @@ from ggxref.sampling._visible import pdf_ggx as pdf
 __all__ = ["pdf", "sample"]
 
 
+@stable.widened
 def sample(u: Vec2, wi: Vec3, alpha: Vec2, *, turn: Turn = _special.cos_sin_turn) -> Vec3:
     """Stretch `wi`, draw a point of the hemisphere's silhouette, lift it to the hemisphere, unstretch.
 

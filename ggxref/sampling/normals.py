@@ -7,6 +7,7 @@ from ggxref._types import Scalar, Turn, Vec2, Vec3
 from ggxref.sampling._sphere import unstretch
 
 
+@stable.widened
 def sample_ggx(u: Vec2, alpha: Vec2, *, turn: Turn = _special.cos_sin_turn) -> Vec3:
     r"""$\omega_m \propto (\alpha_x\sqrt{u_1}\cos 2\pi u_0,\ \alpha_y\sqrt{u_1}\sin 2\pi u_0,\ \sqrt{1-u_1})$.
 
@@ -20,6 +21,7 @@ def sample_ggx(u: Vec2, alpha: Vec2, *, turn: Turn = _special.cos_sin_turn) -> V
     return unstretch(r * cos_phi, r * sin_phi, stable.sqrt(1 - u[1]), alpha)
 
 
+@stable.widened
 def sample_beckmann(u: Vec2, alpha: Vec2, *, turn: Turn = _special.cos_sin_turn) -> Vec3:
     r"""$\omega_m \propto (\alpha_x r\cos 2\pi u_0,\ \alpha_y r\sin 2\pi u_0,\ 1)$, $r = \sqrt{-\ln(1-u_1)}$.
 

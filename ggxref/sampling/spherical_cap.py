@@ -26,6 +26,7 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2, *, turn: Turn = _special.cos_sin_turn
     return unstretch(*half_in_cap(u, ray(alpha[0] * wi[0], alpha[1] * wi[1], wi[2]), 0, turn), alpha)
 
 
+@stable.widened
 def cap_pdf(wo: Vec3, wi: Vec3) -> Scalar:
     r"""Density of the hemisphere's reflections: $1/(2\pi(1+z_i))$ where $z_o > -z_i$, else 0 [1/sr].
 

@@ -34,6 +34,7 @@ def _share_jvp(primals, tangents):
     return _share(wm, wi), jnp.where((a > 0) & (b > 0), change / 2, 0)
 
 
+@stable.widened
 def sample(u: Vec3, wi: Vec3, alpha: Vec2, *, distribution: Literal["ggx", "beckmann"] = "ggx") -> Vec3:
     """Draw a cavity by its projected area, then one of its walls by the area that it shows to `wi`.
 
