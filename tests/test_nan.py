@@ -9,33 +9,29 @@ from points import FUNCTIONS
 
 from ggxref import masking
 
-MODULES = ("slopes", "ndf", "masking", "fresnel")
-NAMES = [n for n in FUNCTIONS if n.split(".")[0] in MODULES] + [
-    "geometry.refract",
-    "sampling.normals.pdf_beckmann",
-    "sampling.slope_ggx.pdf",
-    "sampling.slope_beckmann.pdf",
-    "sampling.lune.pdf",
-    "sampling.v_cavity.pdf",
-    "sampling.bounded_cap.pdf",
-    "sampling.ellipsoid_bounded.pdf",
-    "sampling.spherical_cap.sample",
-    "sampling.bounded_cap.sample",
-    "sampling.ellipsoid_cap.sample",
-    "bsdf.brdf_ggx",
-]
+# Their draws are arrays of pairs, until one is accepted.
+REJECTION = ("sampling.lune.sample_rejection_sphere", "sampling.lune.sample_rejection_ellipsoid")
+NAMES = [n for n in FUNCTIONS if n not in REJECTION]
 # Of these a formula depends on the height alone.
-ABSENT = {("ndf.hemisphere", "wm", 0), ("ndf.hemisphere", "wm", 1)}
+HEIGHTS = (("ndf.hemisphere", "wm"), ("jacobian.slope", "wm"), ("bsdf.brdf", "wi"), ("bsdf.brdf", "wo"))
+ABSENT = {(*place, k) for place in HEIGHTS for k in (0, 1)}
 WI, WO, WM = [0.48, 0.36, 0.8], [-0.6, 0.0, 0.8], [0.0, 0.28, 0.96]
+A = [[0.3, 0.1, 0.0], [0.0, 0.5, 0.0], [0.2, -0.1, 1.0]]
 POINT = (
     dict.fromkeys(["w", "wi"], WI)
-    | dict.fromkeys(["wm"], WM)
+    | dict.fromkeys(["wm", "v"], WM)
+    | dict.fromkeys(["A", "M"], A)
     | {
         "wo": WO,
         "alpha": [0.3, 0.5],
         "factors": [0.3, 0.5],
         "slope": [0.2, -0.1],
-        "A": [[0.3, 0.1, 0.0], [0.0, 0.5, 0.0], [0.2, -0.1, 1.0]],
+        "mean": [0.1, 0.2],
+        "scatter": [[0.04, 0.01], [0.01, 0.09]],
+        "angles": [0.1, 0.2, 0.3],
+        "size": 0.5,
+        "n_i": 1.0,
+        "n_o": 1.5,
         "u": [0.3, 0.6],
         "gamma": 3.0,
         "eta": 0.7,
@@ -44,13 +40,22 @@ POINT = (
         "f0": 0.04,
         "g1_i": 0.9,
         "g1_o": 0.8,
+        "g2": 0.7,
+        "D": 1.2,
+        "G2": 0.8,
+        "F": 0.3,
     }
 )
 
 
+# Draws that are not two numbers.
+DRAWS = {"ellipsoid.lune_area": [0.0, 0.6, 0.8], "sampling.v_cavity.sample": [0.3, 0.6, 0.2]}
+
+
 def lost(name, function) -> set[tuple[str, str, int]]:
     """The numbers, (function, argument, index), whose NaN does not reach the result."""
-    inputs = {a: np.asarray(POINT[a], np.float32) for a in FUNCTIONS[name]}
+    point = POINT | {"u": DRAWS.get(name, POINT["u"])}
+    inputs = {a: np.asarray(point[a], np.float32) for a in FUNCTIONS[name]}
     places = [(a, k) for a, x in inputs.items() for k in range(x.size)]
     rows = {a: np.stack([x] * (1 + len(places))) for a, x in inputs.items()}
     for row, (a, k) in enumerate(places, start=1):

@@ -38,7 +38,7 @@ def cap_pdf(wo: Vec3, wi: Vec3) -> Scalar:
     below = wi[2] < 0
     height = jnp.where(below, square / jnp.where(below, 1 - wi[2], 1), 1 + wi[2])
     # z_o > −z_i, in the sine of the sum of the polar angles: near the poles the heights have lost the angles.
-    sines = length(wi[0], wi[1], 0), length(wo[0], wo[1], 0)
-    above = (wi[2] > 0) & (wo[2] > 0)
-    inside = (above | (sines[0] * wo[2] + sines[1] * wi[2] > 0)) & (height > 0)
-    return jnp.where(inside, 1 / (2 * math.pi * jnp.where(inside, height, 1)), 0)
+    sine = length(wi[0], wi[1], 0) * wo[2] + length(wo[0], wo[1], 0) * wi[2]
+    inside = (((wi[2] > 0) & (wo[2] > 0)) | (sine > 0)) & (height > 0)
+    density = jnp.where(inside, 1 / (2 * math.pi * jnp.where(inside, height, 1)), 0)
+    return jnp.where(jnp.isnan(sine), sine, density)
