@@ -10,7 +10,8 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from ggxref._errorfree import collected, quotient, two_product
+from ggxref import stable
+from ggxref._errorfree import collected, two_product
 from ggxref._types import Mat3, Scalar
 
 Pair = tuple[Scalar, Scalar]
@@ -89,7 +90,9 @@ def determinant(A: Mat3) -> Pair:
 @jax.custom_jvp
 def tangent_square(x: Scalar, y: Scalar, z: Scalar, ax: Scalar, ay: Scalar) -> Pair:
     r"""$(x^2/\alpha_x^2 + y^2/\alpha_y^2)/z^2$, `z > 0`: an exponent, whose error is one of its exponential times as large."""
-    return _over(square_of_pairs(quotient(x, ax), quotient(y, ay)), dot((z,), (z,)))
+    zero, z_square = jnp.zeros_like(z), dot((z,), (z,))
+    p, q = (over((c, zero), (a, zero), stable.reciprocal(a)) for c, a in ((x, ax), (y, ay)))
+    return over(square_of_pairs(p, q), z_square, stable.reciprocal(z_square[0]))
 
 
 @tangent_square.defjvp
@@ -107,15 +110,8 @@ def square_of_pairs(a: Pair, b: Pair) -> Pair:
     return value, rest + 2 * (a[0] * a[1] + b[0] * b[1])
 
 
-def _over(a: Pair, b: Pair) -> Pair:
-    """The quotient; its rest is that of whatever the first division gave."""
-    value = a[0] / b[0]
-    product, error = two_product(value, b[0])
-    return value, (((a[0] - product) - error) + (a[1] - value * b[1])) / b[0]
-
-
 def over(a: Pair, b: Pair, inverse: Scalar) -> Pair:
-    """As `_over`, with `inverse` for 1/b: products alone, which leave a loop whole."""
+    """The quotient, with `inverse` for 1/b: products alone, which leave a loop whole."""
     value = a[0] * inverse
     product, error = two_product(value, b[0])
     return value, (((a[0] - product) - error) + (a[1] - value * b[1])) * inverse

@@ -7,8 +7,9 @@ $\int D(\omega_m)\,(\omega_m\cdot n)\,d\omega_m = 1$ (heitz2014 (1)). `wm` is un
 import math
 
 import jax.numpy as jnp
+from jax import lax
 
-from ggxref import _pairs, _squares, stable
+from ggxref import _pairs, _special, _squares, stable
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import inverse_square, near_one
 from ggxref.slopes import student
@@ -56,9 +57,13 @@ def beckmann_times(wm: Vec3, alpha: Vec2, factor: Real) -> Scalar:
     z_square = jnp.where(seen, z_square, 1)
     x, y, z = (jnp.where(seen, c, d) for c, d in zip(wm, (0.0, 0.0, 1.0), strict=True))
     exponent, rest = _pairs.tangent_square(x, y, z, alpha[0], alpha[1])
-    # Half the exponent twice: the peak 1/(π αx αy) reaches into tails where the exponential alone has underflowed.
-    half = jnp.exp(-exponent / 2)
-    D = (half * factor) * (half * (1 - rest) / (math.pi * alpha[0] * z_square * (alpha[1] * z_square)))
+    m, m_rest, k = _special.exp_minus(exponent, rest)
+    # What the length of `wm` is beyond 1 counts four times; it changes the value, not the derivative.
+    m = m + (m_rest + 4 * m * lax.stop_gradient(stable.excess((x, y, z))))
+    # The power of two in halves: the peak 1/(π αx αy) reaches into tails where the exponential alone has underflowed.
+    half = jnp.floor(k / 2)
+    top = m * _special.power_of_two(-half) * factor
+    D = top / (math.pi * alpha[0] * z_square * (alpha[1] * z_square)) * _special.power_of_two(half - k)
     return jnp.where(seen, D, 0)
 
 
