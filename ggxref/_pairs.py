@@ -104,10 +104,11 @@ def _tangent_square_jvp(primals, tangents):
     return (value, rest), (change, jnp.zeros_like(rest))
 
 
-def square_of_pairs(a: Pair, b: Pair) -> Pair:
-    """The sum of the two squares."""
-    value, rest = dot((a[0], b[0]), (a[0], b[0]))
-    return value, rest + 2 * (a[0] * a[1] + b[0] * b[1])
+def square_of_pairs(*a: Pair) -> Pair:
+    """The sum of their squares."""
+    values = tuple(value for value, _ in a)
+    square, rest = dot(values, values)
+    return square, rest + 2 * sum((value * rest for value, rest in a), jnp.zeros_like(square))
 
 
 def over(a: Pair, b: Pair, inverse: Scalar) -> Pair:

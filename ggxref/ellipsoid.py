@@ -56,8 +56,9 @@ def length(x: Real, y: Real, z: Real) -> Scalar:
 
 
 def normal_square(A: Mat3) -> Scalar:
-    r"""$\|A n\|^2$. `A`: (3, 3)."""
-    return A[0, 2] ** 2 + A[1, 2] ** 2 + A[2, 2] ** 2
+    r"""$\|A n\|^2$, rounded once. `A`: (3, 3)."""
+    n = A[0, 2], A[1, 2], A[2, 2]
+    return _pairs.rounded(_pairs.dot(n, n))
 
 
 def reciprocal_scale(x: Scalar) -> Scalar:
@@ -288,7 +289,8 @@ def projected_area(w: Vec3, A: Mat3, size: Real) -> Scalar:
     walter2014 (26).
     """
     A, scale = near_one(A)
-    return math.pi * (size * scale) ** 2 * length(*times_exactly(A, w)) / jnp.abs(determinant(A))
+    square = _pairs.rounded(_pairs.square_of_pairs(*_pairs.times(A, tuple(w))))
+    return math.pi * (size * scale) ** 2 * stable.sqrt(square) / jnp.abs(determinant(A))
 
 
 @jax.custom_jvp
@@ -303,14 +305,16 @@ def _lune_sum(au: _pairs.Pairs, av: _pairs.Pairs) -> tuple[Scalar, Scalar]:
 
 def _lune_sum_and_normal(au, av):
     """The two of `_lune_sum`, then ‖Au‖, ‖Av‖ and Au × Av."""
-    u, v = (tuple(map(_pairs.rounded, a)) for a in (au, av))
-    u_length, v_length = length(*u), length(*v)
-    product = u_length * v_length
-    cosine = _pairs.rounded(_pairs.dot(u, v))
+    u_square, v_square = (_pairs.rounded(_pairs.square_of_pairs(*a)) for a in (au, av))
+    u_length, v_length = stable.sqrt(u_square), stable.sqrt(v_square)
+    product = stable.sqrt(u_square * v_square)  # one root errs by less than the product of two
+    cosine, rest = _pairs.dot_of_pairs(au, tuple(value for value, _ in av))
+    cosine = cosine + (rest + sum(value * rest for (value, _), (_, rest) in zip(au, av, strict=True)))
     x, y, z = _pairs.cross_of_pairs(au, av)
     # Down to 110° the sum keeps its digits better.
     obtuse = cosine < -product / 3
-    total = jnp.where(obtuse, (x * x + y * y + z * z) / jnp.where(obtuse, product - cosine, 1), product + cosine)
+    sine_square = _pairs.rounded(_pairs.dot((x, y, z), (x, y, z)))
+    total = jnp.where(obtuse, sine_square / jnp.where(obtuse, product - cosine, 1), product + cosine)
     return total, total / v_length, u_length, v_length, (x, y, z)
 
 

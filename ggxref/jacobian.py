@@ -3,9 +3,9 @@
 import jax
 import jax.numpy as jnp
 
-from ggxref import stable
+from ggxref import _pairs, stable
 from ggxref._types import Mat3, Real, Scalar, Vec3
-from ggxref.ellipsoid import determinant, near_one, times_exactly
+from ggxref.ellipsoid import determinant, near_one
 
 
 @stable.widened
@@ -70,6 +70,5 @@ def linear(wm: Vec3, M: Mat3) -> Scalar:
     dupuy2023 (1), tokuyoshi2024 (18).
     """
     M, _ = near_one(M)
-    x, y, z = times_exactly(M, wm)
-    square = x * x + y * y + z * z
+    square = _pairs.rounded(_pairs.square_of_pairs(*_pairs.times(M, tuple(wm))))
     return jnp.abs(determinant(M)) / (square * stable.sqrt(square))  # the root cubed would lose three times its error

@@ -23,10 +23,10 @@ SLOPES = "sampling.slope_ggx.sample"
 LARGEST = {
     "ndf.ellipsoid": 7.3,
     "sampling.ellipsoid_cap.pdf": 9.1,
-    "masking.g1_ellipsoid": 5.9,
+    "masking.g1_ellipsoid": 5.4,
     "ellipsoid.projected_area": 5.3,
-    "ellipsoid.lune_area": 8.8,
-    "jacobian.linear": 8.2,
+    "ellipsoid.lune_area": 8.0,
+    "jacobian.linear": 5.7,
     "ndf.beckmann": 5.6,
     "sampling.slope_beckmann.pdf": 7.6,
     "masking.lambda_beckmann": 3.6,
