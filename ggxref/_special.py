@@ -10,7 +10,9 @@ from jax import lax
 
 from ggxref._errorfree import fast_two_sum, two_product, two_sum
 from ggxref._types import Real, Scalar
-from ggxref.stable import reciprocal
+from ggxref.stable import crude_quotient, reciprocal
+
+Pair = tuple[Scalar, Scalar]
 
 
 def log1p(x: Scalar) -> Scalar:
@@ -91,7 +93,7 @@ _LN2 = {
 }
 
 
-def exp_minus(x: Real, rest: Real) -> tuple[Scalar, Scalar, Scalar]:
+def exp_minus(x: Scalar, rest: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     r"""$e^{-(x + \mathrm{rest})}$ as `(m + m_rest) * 2**-k`: (m, m_rest, k). XLA's own has an error of its own, and underflows."""
     high, low = _LN2[x.dtype]
     k = jnp.round(x * (1 / math.log(2)))
@@ -102,12 +104,53 @@ def exp_minus(x: Real, rest: Real) -> tuple[Scalar, Scalar, Scalar]:
     return m, ((1 - m) + y) + (y_rest + curve), k
 
 
-def power_of_two(k: Real) -> Scalar:
+def power_of_two(k: Scalar) -> Scalar:
     """2**k of a whole number; 0 below the normal range."""
     info = jnp.finfo(k.dtype)
     integer = jnp.int32 if info.bits == 32 else jnp.int64
     biased = jnp.maximum(k + (info.maxexp - 1), 0).astype(integer)
     return lax.bitcast_convert_type(biased << info.nmant, k.dtype)
+
+
+# Taylor coefficients of (artanh s − s)/s³ in s².
+_ARTANH = [1 / k for k in range(3, 27, 2)]
+
+
+def _nearest_power(x: Scalar, y: Scalar) -> tuple[Scalar, Scalar]:
+    """(k, `x 2**-k`), the latter from 2/3 to 3/2 of `y`: the bits of a number are nearly its logarithm. Both positive."""
+    info = jnp.finfo(x.dtype)
+    integer = jnp.int32 if info.bits == 32 else jnp.int64
+    x_bits, y_bits = (lax.bitcast_convert_type(a, integer) for a in (x, y))
+    k = (x_bits - y_bits + (1 << (info.nmant - 1))) >> info.nmant
+    return k.astype(x.dtype), lax.bitcast_convert_type(x_bits - (k << info.nmant), x.dtype)
+
+
+def log1p_over_square(a: Pair, z: Scalar) -> tuple[Pair, Pair]:
+    """`log(1 + a/z²)` in two words, and `a + z²` with its rest as a share of it, for `a >= 0`, `z > 0`; z² may underflow.
+
+    With 1 + a/z² = 2^k m, log m = 2 artanh((m − 1)/(m + 1)): all but the first term is small.
+    """
+    n, z = _nearest_power(z, jnp.ones_like(z))
+    up, down = power_of_two(-n), power_of_two(n)
+    square, square_rest = two_product(z, z)
+    total, lost = two_sum(square * down * down, a[0])
+    lost = lost + (a[1] + square_rest * down * down)
+    k, m = _nearest_power(total, square)
+    k = k - 2 * n
+    share = crude_quotient(lost / 4, total / 4)  # up to the end of the range
+    m_rest = m * share
+    # Near the peak, a/z² itself has the digits.
+    top = jnp.where(k == 0, a[0] * up * up, m - square)
+    top_rest = jnp.where(k == 0, a[1] * up * up, m_rest - square_rest)
+    bottom, bottom_rest = two_sum(m, square)
+    inverse = reciprocal(bottom)
+    s = top * inverse
+    product, error = two_product(s, bottom)
+    s_rest = (((top - product) - error) + (top_rest - s * (bottom_rest + (m_rest + square_rest)))) * inverse
+    high, low = _LN2[s.dtype]
+    value, rest = two_sum(k * high, 2 * s)
+    beyond = s * s * s * _horner(_ARTANH[:6] if s.dtype == jnp.float32 else _ARTANH, s * s)
+    return fast_two_sum(value, rest + (2 * (s_rest + beyond) + k * low)), (total, share)
 
 
 # Chebyshev coefficients in t = (a - 3) / (a + 3) of sqrt(pi) (1 + sqrt(pi) a + 2 a^2) exp(a^2) ierfc(a), a smooth function
@@ -157,7 +200,7 @@ def _ierfc_scaled(a):
     return _horner(_IERFC_POWERS[a.dtype], (a - 3) / (a + 3)) / (_ROOT_PI * (1 + a * (_ROOT_PI + 2 * a)))
 
 
-def half_ierfc(a: Real, square: tuple[Real, Real]) -> tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar], Scalar]:
+def half_ierfc(a: Scalar, square: tuple[Scalar, Scalar]) -> tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar], Scalar]:
     r"""Half the first repeated integral of erfc, $\int_a^\infty \mathrm{erfc} = e^{-a^2}/\sqrt\pi - a\,\mathrm{erfc}(a)$, for `a >= 0`, as a
     quotient of numbers in two words times 2**-k: (numerator, denominator, k).
 
@@ -182,7 +225,7 @@ def half_ierfc(a: Real, square: tuple[Real, Real]) -> tuple[tuple[Scalar, Scalar
 _ERFCX = [(-1) ** k / math.gamma(k / 2 + 1) for k in range(28)]
 
 
-def gaussian_tails(a: Real) -> tuple[Scalar, Scalar]:
+def gaussian_tails(a: Scalar) -> tuple[Scalar, Scalar]:
     """`exp(a²) erfc(a)` and `exp(a²) ierfc(a)` for `a >= 0`: the tails without their underflow."""
     scaled = _ierfc_scaled(a)
     small = a < 0.5

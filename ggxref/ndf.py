@@ -75,8 +75,9 @@ def student_t(wm: Vec3, alpha: Vec2, gamma: Real) -> Scalar:
 
     Ribardière et al. 2017.
     """
-    below = wm[2] <= 0
-    D = student(wm[0], wm[1], jnp.where(below, 1, wm[2]), alpha[0], alpha[1], jnp.asarray(gamma, wm.dtype))
+    below, longer = wm[2] <= 0, lax.stop_gradient(stable.excess(wm))
+    z, gamma = jnp.where(below, 1, wm[2]), jnp.asarray(gamma, wm.dtype)
+    D = student(wm[0], wm[1], z, alpha[0], alpha[1], gamma, longer)
     return jnp.where(below, 0, D)
 
 

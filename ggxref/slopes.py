@@ -87,16 +87,31 @@ def student_t(slope: Vec2, alpha: Vec2, gamma: Real) -> Scalar:
     Ribardière et al. 2017.
     """
     one, gamma = jnp.ones_like(slope[0]), jnp.asarray(gamma, slope.dtype)
-    return student(slope[0], slope[1], one, alpha[0], alpha[1], gamma)
+    return student(slope[0], slope[1], one, alpha[0], alpha[1], gamma, jnp.zeros_like(one))
 
 
 @jax.custom_jvp
-def student(x: Scalar, y: Scalar, z: Scalar, ax: Scalar, ay: Scalar, gamma: Scalar) -> Scalar:
-    r"""$(\gamma-1)^\gamma / (\pi\alpha_x\alpha_y z^4 (\gamma-1+\rho/z^2)^\gamma)$, $\rho = x^2/\alpha_x^2 + y^2/\alpha_y^2$, `z > 0`."""
-    # With q = z² + ρ/(γ−1) this is (z²/q)^(γ−2) / (π αx αy q²): nothing is divided by z.
-    share, _, q = _student_parts(x, y, z, ax, ay, gamma)
-    half = jnp.exp((1 - gamma / 2) * share)  # twice, as in `beckmann`
-    return jnp.where(q == jnp.inf, 0, (half / (ax * q)) * (half / (math.pi * (ay * q))))
+def student(x: Scalar, y: Scalar, z: Scalar, ax: Scalar, ay: Scalar, gamma: Scalar, longer: Scalar) -> Scalar:
+    r"""$(\gamma-1)^\gamma / (\pi\alpha_x\alpha_y z^4 (\gamma-1+\rho/z^2)^\gamma)$, $\rho = x^2/\alpha_x^2 + y^2/\alpha_y^2$, `z > 0`.
+
+    - `longer`: by how much the length of (x, y, z) exceeds 1, which counts four times; a constant to the derivative.
+    """
+    # With q = z² + ρ/(γ−1) this is (z²/q)^(γ−2) / (π αx αy q²): nothing is divided by z. Its exponent is in two words.
+    zero, g = jnp.zeros_like(z), gamma - 1
+    p = tuple(_pairs.over((c, zero), (a, zero), stable.reciprocal(a)) for c, a in ((x, ax), (y, ay)))
+    share = _pairs.over(_pairs.square_of_pairs(*p), (g, zero), stable.reciprocal(g))
+    (log, log_rest), (q, beyond) = _special.log1p_over_square(share, z)
+    exponent, rest = two_product(gamma - 2, log)
+    end = jnp.finfo(z.dtype).maxexp
+    seen = ~(exponent > 4 * end)  # beyond, D is 0 in the dtype
+    rest = rest + (gamma - 2) * log_rest
+    m, m_rest, k = _special.exp_minus(jnp.where(seen, exponent, 4 * end), jnp.where(seen, rest, 0))
+    m = m + (m_rest + m * (4 * longer - 2 * beyond))
+    # In halves, as in `beckmann`; below 2, D may be infinite in the dtype.
+    k = jnp.maximum(k, 2 - 2 * end)
+    half = jnp.floor(k / 2)
+    near, far = m * _special.power_of_two(-half), _special.power_of_two(half - k)
+    return jnp.where(q == jnp.inf, 0, (near / (ax * q)) * (far / (math.pi * (ay * q))))
 
 
 def _student_parts(x, y, z, ax, ay, gamma):
@@ -115,8 +130,8 @@ def _student_parts(x, y, z, ax, ay, gamma):
 @student.defjvp
 def _student_jvp(primals, tangents):
     """Each partial derivative as the value times a quotient, and what cancels by z and γ collected."""
-    (x, y, z, ax, ay, gamma), (dx, dy, dz, dax, day, dgamma) = primals, tangents
-    value, (logarithm, rest, q) = student(*primals), _student_parts(*primals)
+    (x, y, z, ax, ay, gamma, _), (dx, dy, dz, dax, day, dgamma, _) = primals, tangents
+    value, (logarithm, rest, q) = student(*primals), _student_parts(*primals[:6])
     g, share = gamma - 1, rest / q
     # log(1/(1 − h)) − h, by its series where the terms cancel.
     powers = sum(share**k / k for k in range(3, 18))

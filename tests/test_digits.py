@@ -4,9 +4,11 @@ import functools
 import math
 
 import jax.numpy as jnp
+import numpy as np
 import pytest
+from flint import arb, ctx
 
-from ggxref import _special, bsdf, ndf, stable
+from ggxref import _special, bsdf, ndf, slopes, stable
 from ggxref.ellipsoid import canonical_terms
 from ggxref.measure.accuracy import measure
 from ggxref.measure.reference import REFERENCES
@@ -14,6 +16,7 @@ from ggxref.measure.tables import DRAWS, library
 from ggxref.measure.variants.brdf import plain_sum
 from ggxref.measure.variants.densities import fresnel_plain_root
 from ggxref.measure.variants.directions import cap_uncorrected
+from ggxref.oracle import ndf as oracle
 from ggxref.sampling import _sphere, ellipsoid_bounded, ellipsoid_cap
 from ggxref.sampling.ellipsoid_cap import from_sphere, to_sphere
 
@@ -28,6 +31,7 @@ LARGEST = {
     "ellipsoid.lune_area": 8.0,
     "jacobian.linear": 5.7,
     "ndf.beckmann": 5.6,
+    "ndf.student_t": 5.1,
     "sampling.slope_beckmann.pdf": 7.6,
     "masking.lambda_beckmann": 3.6,
     "masking.g1_beckmann": 3.8,
@@ -57,8 +61,16 @@ def plain_beckmann(wm, alpha):
     return jnp.exp(-square / wm[2] ** 2) / (math.pi * alpha[0] * alpha[1] * wm[2] ** 4)
 
 
+def plain_student(wm, alpha, gamma):
+    square = (wm[0] / alpha[0]) ** 2 + (wm[1] / alpha[1]) ** 2
+    log = jnp.log1p(square / wm[2] ** 2 / (gamma - 1))
+    return jnp.exp(-gamma * log) / (math.pi * alpha[0] * alpha[1] * wm[2] ** 4)
+
+
 @pytest.mark.parametrize(
-    ("name", "function"), [("ndf.ellipsoid", plain_ellipsoid), ("ndf.beckmann", plain_beckmann)], ids=["D", "Beckmann"]
+    ("name", "function"),
+    [("ndf.ellipsoid", plain_ellipsoid), ("ndf.beckmann", plain_beckmann), ("ndf.student_t", plain_student)],
+    ids=["D", "Beckmann", "Student"],
 )
 def test_plain_sums_lose_them(name, function):
     assert found(name, function, "skew", rounds=0).p999 > 2 * LARGEST[name]
@@ -69,6 +81,32 @@ def test_dielectric_towards_the_critical_angle(region):
     """There 1 − η² + (ηc)² cancels, and F goes with its root; by a plain sum it is wrong by hundreds or thousands of ulps."""
     assert found("fresnel.dielectric", library("fresnel.dielectric"), region).worst < 15
     assert found("fresnel.dielectric", fresnel_plain_root, region).worst > 150
+
+
+# Ends of the range of a cosine, and of γ: from a tail without a mean to Beckmann's.
+@pytest.mark.parametrize("gamma", [1.00001, 2.0, 30.0, 1e6, 1e25])
+@pytest.mark.parametrize("z", [1e-30, 1e-12, 1e-3, 0.7])
+def test_students_tails(z, gamma):
+    sine = math.sqrt(1 - z * z)
+    for alpha in ([0.1, 0.3], [2.0, 2e-3]):
+        rows = [np.asarray(row, np.float32) for row in ([0.8 * sine, 0.6 * sine, z], alpha, gamma)]
+        value = float(ndf.student_t(*(jnp.asarray(row) for row in rows)))
+        wm, shape = ([arb(float(c)) for c in row] for row in rows[:2])
+        with ctx.workprec(300):
+            exact = oracle.student_t(wm, shape, arb(float(rows[2])))
+            error = float(abs(value / exact - 1))
+        largest, tiny = (float(x) for x in (np.finfo(np.float32).max, np.finfo(np.float32).tiny))
+        if tiny < exact < largest:
+            assert error < LARGEST["ndf.student_t"] * 2**-24
+        else:
+            assert value == (0 if exact < 1 else math.inf)
+
+
+def test_student_beside_the_end_of_the_range():
+    """γ − 1 + slope² is a number yet, its inverse in the dtype 0."""
+    slope, one = jnp.asarray([1.5e19, 0.0], jnp.float32), jnp.ones(2, jnp.float32)
+    assert slopes.student_t(slope, one, 2.0) == 0
+    assert slopes.student_t(slope, 1e-3 * one, 1.001) == 0  # here slope²/α² itself is not
 
 
 def plain_ellipsoid_cap(u, wi, A):
