@@ -8,11 +8,12 @@ than one use are what cuts an expression in pieces.
 
 import jax
 import jax.numpy as jnp
-from jax import lax
+from jax import Array, lax
+from jaxtyping import Bool
 
 from ggxref import stable
-from ggxref._errorfree import collected, two_product
-from ggxref._types import Mat3, Scalar
+from ggxref._errorfree import collected, fast_two_sum, two_product, two_sum
+from ggxref._types import Mat3, Real, Scalar
 
 Pair = tuple[Scalar, Scalar]
 Triple = tuple[Scalar, Scalar, Scalar]
@@ -37,6 +38,33 @@ def _dot_jvp(primals, tangents):
 def rounded(pair: Pair) -> Scalar:
     """The sum, in one number."""
     return pair[0] + pair[1]
+
+
+def total(a: Pair, b: Pair) -> Pair:
+    """`a + b`, as the following ones without a derivative of its own."""
+    value, rest = two_sum(a[0], b[0])
+    return fast_two_sum(value, rest + (a[1] + b[1]))
+
+
+def less(a: Pair, b: Pair) -> Pair:
+    """`a - b`."""
+    return total(a, (-b[0], -b[1]))
+
+
+def product(a: Pair, b: Pair) -> Pair:
+    """`a b`."""
+    value, rest = two_product(a[0], b[0])
+    return value, rest + (a[0] * b[1] + a[1] * b[0])
+
+
+def scaled(a: Pair, factor: Real) -> Pair:
+    """`a` times a power of two, or its negative."""
+    return a[0] * factor, a[1] * factor
+
+
+def choice(condition: Bool[Array, ""], a: Pair, b: Pair) -> Pair:
+    """`where`."""
+    return jnp.where(condition, a[0], b[0]), jnp.where(condition, a[1], b[1])
 
 
 def rows(A: Mat3) -> tuple[Triple, Triple, Triple]:

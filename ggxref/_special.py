@@ -85,6 +85,20 @@ def cos_sin_turn(u: Real, terms: int | None = None) -> tuple[Scalar, Scalar]:
     return jnp.where(negate_cos, -c, c), jnp.where(negate_sin, -s, s)
 
 
+def cos_sin_eighth(v: tuple[Scalar, Scalar]) -> tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar]]:
+    r"""$(\cos 2\pi v, \sin 2\pi v)$ for |v| <= 1/8, `v` and results in two words: to within a tenth of an ulp. No derivative."""
+    turn, turn_rest = v
+    cos_terms, sin_terms = (9, 9) if turn.dtype == jnp.float64 else (6, 5)
+    square = turn * turn
+    tau = float(np.asarray(math.tau).astype(turn.dtype))
+    value, error = two_product(turn, jnp.full_like(turn, tau))
+    rest = error + turn * ((math.tau - tau) + _TAU_REST + square * _horner(_SIN[1:sin_terms], square))
+    s, s_rest = fast_two_sum(value, rest)
+    c, c_rest = fast_two_sum(jnp.ones_like(turn), square * _horner(_COS[1:cos_terms], square))
+    angle = math.tau * turn_rest
+    return (c, c_rest - s * angle), (s, s_rest + c * angle)
+
+
 # 1/k!, and ln 2 in two words, of which the first times an exponent is exact.
 _EXP = [1 / math.factorial(k) for k in range(2, 14)]
 _LN2 = {

@@ -127,23 +127,26 @@ def _canonical_terms(A):
 
 
 def _canonical_and_normal(A):
-    """The five numbers, then a1 x a3 of A's columns and det A."""
+    """The five numbers, then a1 x a3 of A's columns, and c11 with the sign of det A."""
     square, ex, ey, n1, n2 = _beside_the_pole(A)
-    n1_length, det = length(*n1), determinant(A)
+    # In small passes: XLA does not vectorise a loop of so many results that does all of it.
+    (square, ex, ey), minors = stable.one_loop(square, ex, ey), stable.one_loop(*n1, *n2)
+    n1, n2 = minors[:3], minors[3:]
+    n1_length = length(*n1)
     c10 = _pairs.rounded(_pairs.dot(n1, n2)) / (n1_length * square)
-    c11 = jnp.abs(det) / (n1_length * jnp.sqrt(square))
-    return Canonical(n1_length / square, c10, c11, ex, ey), n1, det
+    c11 = determinant(A) / (n1_length * jnp.sqrt(square))
+    return Canonical(n1_length / square, c10, jnp.abs(c11), ex, ey), n1, c11
 
 
 @_canonical_terms.defjvp
 def _canonical_terms_jvp(primals, tangents):
     r"""With $A = \|A n\|\,Q M$, Q orthogonal and M canonical: what $Q^T dA/\|A n\|$ is beyond a turn and a scale of M."""
     (A,), (dA,) = primals, tangents
-    terms, n1, det = _canonical_and_normal(A)
-    c00, c10, c11, ex, ey, det, *n1 = stable.one_loop(*terms, det, *n1)
+    terms, n1, signed = _canonical_and_normal(A)
+    c00, c10, c11, ex, ey, signed, *n1 = stable.one_loop(*terms, signed, *n1)
     norm, up, (x, y, z) = length(*A[:, 2]), stable.unit(*A[:, 2]), stable.unit(*n1)
     q1 = up[1] * z - up[2] * y, up[2] * x - up[0] * z, up[0] * y - up[1] * x
-    q2 = tuple(jnp.where(det < 0, c, -c) for c in (x, y, z))
+    q2 = tuple(jnp.where(signed < 0, c, -c) for c in (x, y, z))
     g = [[(q[0] * a[0] + q[1] * a[1] + q[2] * a[2]) / norm for a in dA.T] for q in (q1, q2, up)]
     (g11, g12, g13), (g21, g22, g23), (g31, g32, g33) = g
     turn = (g21 - ex * g23) / c00
@@ -155,6 +158,44 @@ def _canonical_terms_jvp(primals, tangents):
         g32 - ey * g33 + c10 * g13 + c11 * g23,
     )
     return Canonical(c00, c10, c11, ex, ey), Canonical(*changes)
+
+
+Frame = tuple[Canonical, Scalar, tuple[Scalar, Scalar]]
+
+
+def canonical_frame(A: Mat3) -> Frame:
+    """`canonical_terms`; of the turn to them, -1 where it reflects, else 1; and where it takes the second row of `basis(A n)`, the
+    cosine and sine of the azimuth a right angle ahead of it, times a number. `A`: as `canonical_terms`.
+    """
+    return _canonical_frame(near_one(A)[0])
+
+
+@jax.custom_jvp
+def _canonical_frame(A):
+    terms, n1, signed = _canonical_and_normal(A)
+    side = jnp.where(signed < 0, -1, 1).astype(signed.dtype)
+    side, cosine, sine = stable.one_loop(side, *_second_row(A, n1, side))
+    return Canonical(*stable.one_loop(*terms)), side, (cosine, sine)
+
+
+def _second_row(A, n1, side):
+    """The azimuth of `canonical_frame`, from n1 = a1 x a3 of A's columns."""
+    (x, y, z), (p, q, r) = n1, A[:, 2]
+    s = jnp.where(jnp.signbit(r), -1, 1).astype(r.dtype)
+    # n1 times the first two rows of the basis, shorter as it is perpendicular to A n.
+    bend = z / (s * length(p, q, r) + r)
+    cosine, sine = s * (y - bend * q), side * (x - bend * p)
+    scale = reciprocal_scale(jnp.abs(cosine) + jnp.abs(sine))
+    return cosine * scale, sine * scale
+
+
+@_canonical_frame.defjvp
+def _canonical_frame_jvp(primals, tangents):
+    (A,) = primals
+    terms, side, pole = _canonical_frame(A)
+    _, change = _canonical_terms_jvp(primals, tangents)
+    _, turn = jax.jvp(lambda A: _second_row(A, jnp.cross(A[:, 0], A[:, 2]), side), primals, tangents)
+    return (terms, side, pole), (change, jnp.zeros_like(side), turn)
 
 
 @stable.widened

@@ -9,7 +9,7 @@ import pytest
 from flint import arb, ctx
 
 from ggxref import _special, bsdf, ndf, slopes, stable
-from ggxref.ellipsoid import canonical_terms
+from ggxref.ellipsoid import canonical_frame, canonical_terms
 from ggxref.measure.accuracy import measure
 from ggxref.measure.reference import REFERENCES
 from ggxref.measure.tables import DRAWS, library
@@ -17,11 +17,12 @@ from ggxref.measure.variants.brdf import plain_sum
 from ggxref.measure.variants.densities import fresnel_plain_root
 from ggxref.measure.variants.directions import cap_uncorrected
 from ggxref.oracle import ndf as oracle
-from ggxref.sampling import _sphere, ellipsoid_bounded, ellipsoid_cap
+from ggxref.sampling import _lune, _sphere, ellipsoid_bounded, ellipsoid_cap, lune
 from ggxref.sampling.ellipsoid_cap import from_sphere, to_sphere
 
 COUNT = 1 << 13
 SLOPES = "sampling.slope_ggx.sample"
+LUNE = "sampling.lune.sample"
 # A little above the largest error in ulps that 2^16 to 2^20 points of every region and a search came to.
 LARGEST = {
     "ndf.ellipsoid": 7.3,
@@ -168,3 +169,18 @@ def test_scales_near_the_ends_of_the_range():
     long = jnp.diag(jnp.asarray([1e10, 1, 1], jnp.float32))
     for sampler in (ellipsoid_cap, ellipsoid_bounded):
         assert jnp.linalg.norm(sampler.sample(u, wi, long)) == pytest.approx(1, rel=1e-6)
+
+
+def lune_in_one_word(u, wi, A):
+    """The lune's sampler with its rests left out."""
+    terms, side, pole = canonical_frame(A)
+    x, y, z = (c for c, _ in lune.to_sphere(wi, terms))
+    return from_sphere(*_lune.plain_point(u, (x, y, z), side, pole), terms)
+
+
+def test_lune_sampler_is_within_two_epsilon():
+    """As the slope sampler; `ordinals` has u of 1e-6, where 2u - 1 loses the digits of u, and anisotropies of 50."""
+    for region in ("skew", "ordinals"):
+        ours, plain = (found(LUNE, f, region, rounds=0) for f in (library(LUNE), lune_in_one_word))
+        assert max(ours.excess, ours.p999) < 4
+        assert min(plain.excess, plain.p999) > 5

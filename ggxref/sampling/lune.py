@@ -1,52 +1,33 @@
 """Visible normals of the ellipsoid NDF through the silhouette of a lune: walter2014 §4, versions 1 to 3."""
 
+import functools
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from ggxref import _pairs, _special, stable
 from ggxref._types import Mat3, Scalar, Vec2, Vec3
-from ggxref.ellipsoid import cofactor, length, near_one, normal_square, times, times_exactly
+from ggxref.ellipsoid import Canonical, canonical_frame, cofactor, length, near_one, reciprocal_scale, times
 from ggxref.geometry import basis
-from ggxref.sampling._sphere import Incident, crescent
+from ggxref.sampling._lune import one_pass, point
 from ggxref.sampling._visible import pdf_ellipsoid as pdf
 
 __all__ = ["pdf", "sample", "sample_rejection_ellipsoid", "sample_rejection_sphere"]
 
 
-def _concentric(u: Vec2) -> tuple[Scalar, Scalar, Scalar]:
-    """Point of the unit disk and its `1 - r²`: walter2014 (34)–(37) (Shirley & Chiu 1997)."""
-    a, b = 2 * u[0] - 1, 2 * u[1] - 1
-    wide = jnp.abs(a) > jnp.abs(b)
-    r, other = jnp.where(wide, a, b), jnp.where(wide, b, a)
-    c, s = _special.cos_sin_turn(other / (8 * jnp.where(r == 0, 1, r)))
-    edge = 2 * jnp.minimum(jnp.minimum(u[0], 1 - u[0]), jnp.minimum(u[1], 1 - u[1]))  # 1 - |r|
-    return r * jnp.where(wide, c, s), r * jnp.where(wide, s, c), edge * (2 - edge)
+def _image(column: tuple[Scalar, ...], p: tuple[_pairs.Pair, ...]) -> Scalar:
+    value, rest = _pairs.dot(column, tuple(hi for hi, _ in p))
+    return value + (rest + sum(c * low for c, (_, low) in zip(column, p, strict=True)))
 
 
-def _frame(wi, A):
-    """(42)–(44) and the lune's angle: e1, e2, e3 as rows, `A wi` in the coordinates of A n's pole, and ‖A n‖."""
-    a, n = times_exactly(A, wi), (A[0, 2], A[1, 2], A[2, 2])
-    norm_a, norm_n = length(*a), length(*n)
-    side = wi[1], -wi[0], jnp.zeros_like(wi[0])
-    # Aψ × An, also where det A < 0: its minors and their sums cancel under skew.
-    x, y, z = (_pairs.rounded(_pairs.dot_of_pairs(row, side)) for row in _pairs.cofactor(A))
-    sin_product = length(x, y, z)
-    e3 = tuple(c / norm_a for c in a)
-    collinear = sin_product == 0
-    free, safe = basis(jnp.stack(e3)), jnp.where(collinear, 1, sin_product)
-    e2 = tuple(jnp.where(collinear, f, c / safe) for f, c in zip(free[1], (x, y, z), strict=True))
-    turned = (e2[j] * e3[k] - e2[k] * e3[j] for j, k in ((1, 2), (2, 0), (0, 1)))
-    e1 = tuple(jnp.where(collinear, f, c) for f, c in zip(free[0], turned, strict=True))
-    product = norm_a * norm_n
-    cosine = a[0] * n[0] + a[1] * n[1] + a[2] * n[2]
-    sin_theta = sin_product / product
-    large = product + jnp.abs(cosine)
-    small = sin_product / large * sin_product
-    below = cosine < 0
-    rise, fall = jnp.where(below, small, large) / product, jnp.where(below, large, small) / product
-    pole = Incident(sin_theta, jnp.zeros_like(sin_theta), cosine / product, rise, fall)
-    return (e1, e2, e3), pole, norm_n
+def to_sphere(wi: Vec3, A: Canonical) -> tuple[_pairs.Pair, ...]:
+    """`A wi` for a canonical `A`, its largest component near 1."""
+    c00, c10, c11, ex, ey = A
+    x, y, z = wi
+    i = _pairs.dot((c00, c10), (x, y)), _pairs.dot((c11,), (y,)), _pairs.dot((ex, ey, jnp.ones_like(z)), (x, y, z))
+    scale = reciprocal_scale(functools.reduce(jnp.maximum, (jnp.abs(c) for c, _ in i)))
+    return tuple(_pairs.scaled(c, scale) for c in i)
 
 
 @stable.widened
@@ -59,23 +40,10 @@ def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:
 
     walter2014 (34)–(46), version 3. Where ω_i = n, (43) leaves e₂ free: it is the second row of `geometry.basis(e3)`.
     """
-    A, _ = near_one(A)
-    along, across, rim = _concentric(u)
-    (e1, e2, e3), pole, norm_n = _frame(wi, A)
-    moved, lifted, height = stable.one_loop(*crescent(along, rim, pole, pole.x))
-    x, y, z = (moved * a + across * b + lifted * c for a, b, c in zip(e1, e2, e3, strict=True))
-    p = stable.one_loop(x, y, z)
-    # The components are p·a for the columns a of A. Of each, the share of An takes `height`, which is exact towards the
-    # horizon and has its sign right, where p has lost it; only the rest is left to p.
-    An, square = (A[0, 2], A[1, 2], A[2, 2]), normal_square(A)
-    raised = norm_n * height
-
-    def component(a):
-        share = _pairs.rounded(_pairs.dot(a, An)) / square
-        rest = tuple(x - share * n for x, n in zip(a, An, strict=True))
-        return rest[0] * p[0] + rest[1] * p[1] + rest[2] * p[2] + share * raised
-
-    return stable.direction(component((A[0, 0], A[1, 0], A[2, 0])), component((A[0, 1], A[1, 1], A[2, 1])), raised)
+    terms, side, pole = canonical_frame(A)
+    x, y, z = point(u, one_pass(*to_sphere(wi, terms)), side, pole)
+    c00, c10, c11, ex, ey = terms
+    return stable.direction(_image((c00, ex), (x, z)), _image((c10, c11, ey), (x, y, z)), _pairs.rounded(z))
 
 
 Tries = Float[Array, "n 2"]
