@@ -286,13 +286,11 @@ def _inverse_square_and_parts(wm, A):
     d, d_rest = det[0] * scale, det[1] * scale
     image = [(x * scale, rest * scale) for x, rest in (_pairs.dot_of_pairs(row, w) for row in minors)]
     x, y, z = (x for x, _ in image)
-    total, rest = _pairs.dot((x, y, z), (x, y, z))
-    rest = rest + 2 * (x * image[0][1] + y * image[1][1] + z * image[2][1])
+    d_square = _pairs.square_of_pairs((d, d_rest))
+    q, q_rest = _pairs.over(_pairs.square_of_pairs(*image), d_square, stable.reciprocal(d_square[0]))
     longer = 2 * stable.excess(wm)
     square = jnp.where(longer > -1, 1 + longer, 1)  # ‖w‖², but for the zero vector
-    d_square, d_square_rest = _pairs.dot((d,), (d,))
-    smaller = (d_square_rest + 2 * d * d_rest) / d_square + longer / square
-    q = (total + (rest - total * smaller)) / d_square
+    q = q + (q_rest - q * (longer / square))
     return q, jnp.abs(_pairs.rounded(det)), d, (x, y, z), [[_pairs.rounded(p) * scale for p in row] for row in minors]
 
 

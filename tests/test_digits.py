@@ -25,8 +25,8 @@ SLOPES = "sampling.slope_ggx.sample"
 LUNE = "sampling.lune.sample"
 # A little above the largest error in ulps that 2^16 to 2^20 points of every region and a search came to.
 LARGEST = {
-    "ndf.ellipsoid": 7.3,
-    "sampling.ellipsoid_cap.pdf": 9.1,
+    "ndf.ellipsoid": 6.0,
+    "sampling.ellipsoid_cap.pdf": 8.0,
     "masking.g1_ellipsoid": 5.4,
     "ellipsoid.projected_area": 5.3,
     "ellipsoid.lune_area": 8.0,
