@@ -70,7 +70,7 @@ def times(group: dict) -> dict[str, list[tuple[speed.Timing, float | None, float
     for size in SIZES:
         wanted = {theirs for _, theirs, _ in group.values()}
         others = {name: call for name, call in peers.mitsuba(size).items() if name in wanted}
-        for name in group.keys() & DIFFERENTLY.keys():
+        for name in [n for n in group if n in DIFFERENTLY]:
             args = speed.inputs(arguments(group[name][0]), size)
             others[name] = speed.subject(group[name][0], args, **DIFFERENTLY[name])
         ours = {name: f for name, (f, _, _) in group.items() if name not in DIFFERENTLY}

@@ -38,7 +38,7 @@ def brdf_ggx(wi: Vec3, wo: Vec3, alpha: Vec2, *, add: Callable = stable.evened_s
     $q = (h_x^2/\alpha_x^2 + h_y^2/\alpha_y^2 + h_z^2)/\|h\|^2$, $A = \mathrm{diag}(\alpha_x, \alpha_y, 1)$.
 
     - `wi`, `wo`: unit, (3,); 0 unless both are above the horizon. `alpha`: positive, (2,).
-    - In float32, $\omega_i + \omega_o$ from 1e-18 (0 below that), α from 1e-8.
+    - In float32, $\omega_i + \omega_o$ from 1e-18 max(1, α) (0 where its square is below the range), α from 1e-8.
     - `add`: the form of $\omega_i + \omega_o$. `stable.unit_sum` errs by no more than 16 ulp in all, for half as much time again.
     - F's cosine, $\omega_i\cdot\omega_h$, is $\|h\|/2$.
     - Its gradient is cut to the end of the dtype's range, which it leaves towards the horizon.
@@ -64,7 +64,7 @@ def _mirrored(add, wi, wo, alpha):
     x, y, z = add(wi, wo)
     square = x * x + y * y + z * z
     stretched = (x / alpha[0]) ** 2 + (y / alpha[1]) ** 2 + z * z
-    unseen = (wi[2] <= 0) | (wo[2] <= 0) | (square <= 0)  # a NaN is not
+    unseen = (wi[2] <= 0) | (wo[2] <= 0) | (square <= 0) | (stretched <= 0)  # a NaN is not
     # The rule below knows their derivatives: no need of a root that guards its own.
     length_i, length_o = (jnp.sqrt(w[2] ** 2 + ((alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2)) for w in (wi, wo))
     between = wo[2] * length_i + wi[2] * length_o
@@ -74,8 +74,9 @@ def _mirrored(add, wi, wo, alpha):
 @functools.partial(jax.custom_jvp, nondiff_argnums=(0,))
 def _brdf_ggx(add, wi, wo, alpha):
     m = _mirrored(add, wi, wo, alpha)
-    over_q = m.square / m.stretched  # a quotient of its own: the squares of both may underflow
-    return jnp.where(m.unseen, 0, over_q * over_q / (2 * math.pi * alpha[0] * alpha[1] * m.between))
+    # Neither the two squares nor α² times the heights, which both may underflow.
+    over_q, over_area = m.square / m.stretched, 1 / (2 * math.pi * alpha[0] * alpha[1])
+    return jnp.where(m.unseen, 0, over_q * over_area * over_q / m.between)
 
 
 @_brdf_ggx.defjvp

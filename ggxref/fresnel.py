@@ -115,7 +115,7 @@ def _conductor(cosine, c_square, eta, k):
     root = jnp.sqrt(larger)
     twice = jnp.where(real >= 0, larger, imaginary) * (math.sqrt(2) * s * jnp.abs(cosine))  # 2ac
     # |r_p/r_s|² = (W − 2ac sin²θ)/(W + 2ac sin²θ), W = (a² + b²)c² + sin⁴θ, and F is half of |r_s|² + |r_p|².
-    W = (norm * (c_square / least) + (sin_square * sin_square * (unit / least) + 1)) * root
+    W = (norm * (c_square / least) + (sin_square * sin_square + least) * (unit / least)) * root
     total = (norm + unit * c_square) * root + twice
     reflected = (gap * gap + imaginary * imaginary) * larger * W
     denominator = total * total * (W + twice * (sin_square / least))

@@ -17,6 +17,7 @@ from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import canonical, reciprocal_scale
 
 
+@stable.widened
 def from_normal(wm: Vec3) -> Vec2:
     """Slope of the micronormal `wm`: unit, (3,), above the horizon; the result is (2,). heitz2014 §5.1."""
     return jnp.stack([-wm[0] / wm[2], -wm[1] / wm[2]])
@@ -30,6 +31,7 @@ def to_normal(slope: Vec2) -> Vec3:
     return jnp.stack(stable.unit(-x * scale, -y * scale, scale))
 
 
+@stable.widened
 def stretch(w: Vec3, factors: Vec2) -> Vec3:
     r"""Direction after stretching the surface: $(\lambda_x x, \lambda_y y, z)$, normalised.
 

@@ -27,10 +27,10 @@ def widened(function: Callable) -> Callable:
     @functools.wraps(function)
     def in_float32(*args, **named):
         numbers = args, {k: x for k, x in named.items() if not (isinstance(x, str) or callable(x))}
-        given = [jnp.result_type(x) for x in jax.tree.leaves(numbers)]
-        if not any(jnp.issubdtype(each, jnp.floating) and each.itemsize == 2 for each in given):
+        given = jax.tree.leaves(numbers)
+        if not any(jnp.issubdtype(d, jnp.floating) and d.itemsize == 2 for d in map(jnp.result_type, given)):
             return function(*args, **named)
-        dtype = jnp.result_type(*given)
+        dtype = jnp.result_type(*given)  # of Python's numbers beside arrays, the arrays'
         wide, wide_named = jax.tree.map(lambda x: jnp.asarray(x, jnp.promote_types(dtype, jnp.float32)), numbers)
         result = function(*wide, **(named | wide_named))
         return jax.tree.map(lambda x: x.astype(dtype) if jnp.issubdtype(x.dtype, jnp.floating) else x, result)

@@ -2,6 +2,7 @@
 
 from itertools import product
 
+import jax
 import jax.numpy as jnp
 import ml_dtypes
 import numpy as np
@@ -210,17 +211,36 @@ def test_half_precision_is_finite_where_the_value_is(name, half, table):
     assert np.all(np.isfinite(rows)), shown(rows, {a: x[keep] for a, x in inputs.items()})
 
 
-@pytest.mark.parametrize("height", [1e-6, 1e-12, 1e-18])
-def test_brdf_of_opposite_directions_does_not_underflow(height):
+@pytest.mark.parametrize("alpha", [(0.5, 0.25), (1e-4, 1e-4), (10.0, 0.1)])
+@pytest.mark.parametrize("height", [1e-6, 1e-12, 1e-17])
+def test_brdf_of_opposite_directions_does_not_underflow(height, alpha):
     """h = (0, 0, 2z), whose fourth power is below float32's range: D of the normal, G2 and 1/(4 z²) give 1/(4π αx² αy z), about."""
     wi, wo = (jnp.asarray([x, 0, height], jnp.float32) for x in (1, -1))
-    found = public("bsdf.brdf_ggx")(wi, wo, jnp.asarray([0.5, 0.25], jnp.float32))
-    np.testing.assert_allclose(found, 1 / (4 * np.pi * 0.5**2 * 0.25 * float(wi[2])), rtol=1e-6)
+    found = public("bsdf.brdf_ggx")(wi, wo, jnp.asarray(alpha, jnp.float32))
+    length = np.hypot(alpha[0], height)
+    np.testing.assert_allclose(found, 1 / (4 * np.pi * alpha[0] * alpha[1] * length * float(wi[2])), rtol=2e-6)
+
+
+@pytest.mark.parametrize(("alpha", "height"), [(1e-4, 1e-30), (1e-2, 1e-35), (1e-8, 1e-20)])
+def test_brdf_at_the_horizon_of_a_smooth_surface(alpha, height):
+    """ω_i and ω_o a quarter turn apart: q is 1/α², and what divides is α³ z; its gradient is finite."""
+    wi, wo = (jnp.asarray([x, 1 - x, height], jnp.float32) for x in (1, 0))
+    brdf, alphas = public("bsdf.brdf_ggx"), jnp.full(2, alpha, jnp.float32)
+    np.testing.assert_allclose(brdf(wi, wo, alphas), alpha / (4 * np.pi * height), rtol=2e-6)
+    assert all(np.isfinite(slope).all() for slope in jax.grad(brdf, (0, 1, 2))(wi, wo, alphas))
 
 
 @pytest.mark.parametrize(
     ("cosine", "eta", "k", "F"),
-    [(1, 1e-20, 0, 1), (1, 2e-4, 0, 0.99920032), (0.5, 1, 1e7, 1), (0.5, 1e9, 0, 1), (0, 1, 0, 0), (0.3, 1, 0, 0)],
+    [
+        (1, 1e-20, 0, 1),
+        (1, 2e-4, 0, 0.99920032),
+        (0.5, 1, 1e7, 1),
+        (0.5, 1e9, 0, 1),
+        (0, 1, 0, 0),
+        (0.3, 1, 0, 0),
+        (1e-9, 1e9, 1e9, 0.5999999977374455),
+    ],
 )
 def test_conductor_of_extreme_indices(cosine, eta, k, F):
     """The products in it go with the index to the ninth, and a small one cancels."""

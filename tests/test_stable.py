@@ -9,7 +9,7 @@ import pytest
 from flint import arb
 from library import numbers
 
-from ggxref import _special, _squares, ndf, stable
+from ggxref import _special, _squares, bsdf, fresnel, geometry, ndf, stable
 from ggxref._errorfree import two_product
 from ggxref.oracle.precision import working
 from ggxref.sampling import ellipsoid_cap, normals
@@ -381,3 +381,14 @@ def test_half_precision_beside_single_is_widened(half):
             got = function(*mixed)
             assert got.dtype == jnp.float32
             np.testing.assert_allclose(got, whole, rtol=0.1, atol=0.01)  # w of bfloat16 has three digits
+
+
+@pytest.mark.parametrize("half", [jnp.float16, jnp.bfloat16])
+@pytest.mark.parametrize("x64", [False, True])
+def test_a_number_beside_half_precision_leaves_it_half(half, x64):
+    """A Python number has no dtype of its own: F = 1 beside float16 is float16's."""
+    with jax.enable_x64(x64):
+        g, w = jnp.asarray(0.5, half), jnp.asarray([0.6, 0.0, 0.8], half)
+        assert bsdf.weight_visible(g, g, 1.0).dtype == half
+        assert fresnel.schlick(g, 0.04).dtype == half and fresnel.conductor(g, 0.2, 3.5).dtype == half
+        assert geometry.refract(w, w, 1 / 1.5).dtype == half
