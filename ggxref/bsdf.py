@@ -74,9 +74,9 @@ def _mirrored(add, wi, wo, alpha):
 @functools.partial(jax.custom_jvp, nondiff_argnums=(0,))
 def _brdf_ggx(add, wi, wo, alpha):
     m = _mirrored(add, wi, wo, alpha)
-    # Neither the two squares nor α² times the heights, which both may underflow.
+    # Neither the two squares nor α² times the heights, which both may underflow. Used more than once, a quotient would cut the loop.
     over_q, over_area = m.square / m.stretched, 1 / (2 * math.pi * alpha[0] * alpha[1])
-    return jnp.where(m.unseen, 0, over_q * over_area * over_q / m.between)
+    return jnp.where(m.unseen, 0, over_q * over_q * over_area / m.between)
 
 
 @_brdf_ggx.defjvp
