@@ -101,6 +101,11 @@ def front(rows: Rows) -> Rows:
     return kept
 
 
+def _within(worst: float) -> float:
+    """An error as it is drawn: infinite and vanishing ones at the ends."""
+    return min(max(worst, 1e-9), 1e12)
+
+
 def pareto(rows: Rows, caption: str) -> Figure:
     """Error against time for every form of every quantity, the front drawn."""
     names = _unique(rows, "quantity")
@@ -108,11 +113,11 @@ def pareto(rows: Rows, caption: str) -> Figure:
     for ax, name in zip(axes.flat, names, strict=False):
         mine = [r for r in rows if r["quantity"] == name]
         edge = front(mine)
-        ax.step([r["ns"] for r in edge], [max(r["worst"], 1e-9) for r in edge], where="post", color="0.6", lw=1)
+        ax.step([r["ns"] for r in edge], [_within(r["worst"]) for r in edge], where="post", color="0.6", lw=1)
         for k, r in enumerate(mine):
             ax.plot(
                 r["ns"],
-                min(max(r["worst"], 1e-9), 1e12),
+                _within(r["worst"]),
                 MARKERS[k],
                 color="black",
                 ms=6,
