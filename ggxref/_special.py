@@ -9,10 +9,9 @@ import numpy as np
 from jax import lax
 
 from ggxref._errorfree import fast_two_sum, two_product, two_sum
+from ggxref._pairs import Pair
 from ggxref._types import Real, Scalar
 from ggxref.stable import crude_quotient, reciprocal
-
-Pair = tuple[Scalar, Scalar]
 
 
 def log1p(x: Scalar) -> Scalar:
@@ -85,7 +84,7 @@ def cos_sin_turn(u: Real, terms: int | None = None) -> tuple[Scalar, Scalar]:
     return jnp.where(negate_cos, -c, c), jnp.where(negate_sin, -s, s)
 
 
-def cos_sin_eighth(v: tuple[Scalar, Scalar]) -> tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar]]:
+def cos_sin_eighth(v: Pair) -> tuple[Pair, Pair]:
     r"""$(\cos 2\pi v, \sin 2\pi v)$ for |v| <= 1/8, `v` and results in two words: to within a tenth of an ulp. No derivative."""
     turn, turn_rest = v
     cos_terms, sin_terms = (9, 9) if turn.dtype == jnp.float64 else (6, 5)
@@ -214,7 +213,7 @@ def _ierfc_scaled(a):
     return _horner(_IERFC_POWERS[a.dtype], (a - 3) / (a + 3)) / (_ROOT_PI * (1 + a * (_ROOT_PI + 2 * a)))
 
 
-def half_ierfc(a: Scalar, square: tuple[Scalar, Scalar]) -> tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar], Scalar]:
+def half_ierfc(a: Scalar, square: Pair) -> tuple[Pair, Pair, Scalar]:
     r"""Half the first repeated integral of erfc, $\int_a^\infty \mathrm{erfc} = e^{-a^2}/\sqrt\pi - a\,\mathrm{erfc}(a)$, for `a >= 0`, as a
     quotient of numbers in two words times 2**-k: (numerator, denominator, k).
 

@@ -21,15 +21,6 @@ def times(A: Mat3, x: Real, y: Real, z: Real) -> tuple[Scalar, Scalar, Scalar]:
     return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
 
 
-def times_exactly(A: Mat3, w: Vec3) -> tuple[Scalar, Scalar, Scalar]:
-    """`A w`, each component rounded once: under skew and strong anisotropy the plain sums cancel.
-
-    - `A`: (3, 3). `w`: (3,). Returns the three components.
-    """
-    x, y, z = map(_pairs.rounded, _pairs.times(A, tuple(w)))
-    return x, y, z
-
-
 @stable.widened
 def cofactor(A: Mat3) -> tuple[Mat3, Scalar]:
     r"""The cofactor matrix $\det(A)\,A^{-T}$ and $\det A$, without a division: (3, 3) and ().
