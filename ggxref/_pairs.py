@@ -79,12 +79,14 @@ def cross(a: tuple[Scalar, ...], b: tuple[Scalar, ...]) -> Pairs:
     return x, y, z
 
 
-def cross_of_pairs(a: Pairs, b: Pairs) -> Triple:
-    """`a × b` of two-word vectors, rounded once: exact also where they are parallel but for half their digits."""
+def cross_of_pairs(a: Pairs, b: Pairs) -> Pairs:
+    """`a × b` of two-word vectors: exact also where they are parallel but for half their digits."""
 
     def component(j, k):
         value, rest = dot((a[j][0], a[k][0]), (b[k][0], -b[j][0]))
-        return value + (rest + ((a[j][0] * b[k][1] + a[j][1] * b[k][0]) - (a[k][0] * b[j][1] + a[k][1] * b[j][0])))
+        return _evened(
+            value, rest + ((a[j][0] * b[k][1] + a[j][1] * b[k][0]) - (a[k][0] * b[j][1] + a[k][1] * b[j][0]))
+        )
 
     return component(1, 2), component(2, 0), component(0, 1)
 
@@ -92,8 +94,12 @@ def cross_of_pairs(a: Pairs, b: Pairs) -> Triple:
 def dot_of_pairs(a: Pairs, b: Triple) -> Pair:
     """`a · b` of a two-word vector."""
     value, rest = dot(tuple(hi for hi, _ in a), b)
-    rest = rest + (a[0][1] * b[0] + a[1][1] * b[1] + a[2][1] * b[2])
-    total = value + rest  # where the values cancel, the rest is as large
+    return _evened(value, rest + (a[0][1] * b[0] + a[1][1] * b[1] + a[2][1] * b[2]))
+
+
+def _evened(value: Scalar, rest: Scalar) -> Pair:
+    """The pair of that sum: where the values cancelled, the rest is as large."""
+    total = value + rest
     return total, lax.stop_gradient((value - total) + rest)
 
 

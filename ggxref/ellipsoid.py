@@ -46,6 +46,11 @@ def length(x: Real, y: Real, z: Real) -> Scalar:
     return stable.sqrt(x * x + y * y + z * z)
 
 
+def _length_of_pairs(a: _pairs.Pairs) -> _pairs.Pair:
+    square = _pairs.square_of_pairs(*a)
+    return _pairs.root(square, stable.rsqrt(square[0]))
+
+
 def normal_square(A: Mat3) -> Scalar:
     r"""$\|A n\|^2$, rounded once. `A`: (3, 3)."""
     n = A[0, 2], A[1, 2], A[2, 2]
@@ -325,7 +330,7 @@ def projected_area(w: Vec3, A: Mat3, size: Real) -> Scalar:
 
 @jax.custom_jvp
 def _lune_sum(au: _pairs.Pairs, av: _pairs.Pairs) -> tuple[Scalar, Scalar]:
-    r"""$T = \|Au\|\|Av\| + Au\cdot Av$, the factor of every lune, and $T/\|Av\|$; exact also where $Au \approx -Av$.
+    r"""$T = \|Au\|\|Av\| + Au\cdot Av$, the factor of every lune, and $T/\|Av\|$, each rounded once; exact also where $Au \approx -Av$.
 
     There the sum cancels, and $\|Au \times Av\|^2 / (\|Au\|\|Av\| - Au\cdot Av)$ does not, of vectors in two words: rounded, they
     would have lost the angle between them.
@@ -335,17 +340,19 @@ def _lune_sum(au: _pairs.Pairs, av: _pairs.Pairs) -> tuple[Scalar, Scalar]:
 
 def _lune_sum_and_normal(au, av):
     """The two of `_lune_sum`, then ‖Au‖, ‖Av‖ and Au × Av."""
-    u_square, v_square = (_pairs.rounded(_pairs.square_of_pairs(*a)) for a in (au, av))
-    u_length, v_length = stable.sqrt(u_square), stable.sqrt(v_square)
-    product = stable.sqrt(u_square * v_square)  # one root errs by less than the product of two
+    u_length, v_length = (_length_of_pairs(a) for a in (au, av))
+    product, n = _pairs.product(u_length, v_length), _pairs.cross_of_pairs(au, av)
     cosine, rest = _pairs.dot_of_pairs(au, tuple(value for value, _ in av))
-    cosine = cosine + (rest + sum(value * rest for (value, _), (_, rest) in zip(au, av, strict=True)))
-    x, y, z = _pairs.cross_of_pairs(au, av)
+    cosine = cosine, rest + sum(value * rest for (value, _), (_, rest) in zip(au, av, strict=True))
     # Down to 110° the sum keeps its digits better.
-    obtuse = cosine < -product / 3
-    sine_square = _pairs.rounded(_pairs.dot((x, y, z), (x, y, z)))
-    total = jnp.where(obtuse, sine_square / jnp.where(obtuse, product - cosine, 1), product + cosine)
-    return total, total / v_length, u_length, v_length, (x, y, z)
+    obtuse = cosine[0] < -product[0] / 3
+    zero, one = jnp.zeros_like(product[0]), jnp.ones_like(product[0])
+    divisor = _pairs.choice(obtuse, _pairs.less(product, cosine), (one, zero))
+    conjugate = _pairs.over(_pairs.square_of_pairs(*n), divisor, stable.reciprocal(divisor[0]))
+    total = _pairs.choice(obtuse, conjugate, _pairs.total(product, cosine))
+    ratio = _pairs.over(total, v_length, stable.reciprocal(v_length[0]))
+    total, ratio, u_length, v_length = map(_pairs.rounded, (total, ratio, u_length, v_length))
+    return total, ratio, u_length, v_length, tuple(map(_pairs.rounded, n))
 
 
 @_lune_sum.defjvp
