@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 from jax.scipy.special import erfc
 
-from ggxref import stable
+from ggxref import _squares, stable
 from ggxref._pairs import Triple
 from ggxref._types import Real, Scalar
 
@@ -34,7 +34,7 @@ def _square(w, alpha):
 
 def area_ggx(w: Triple, alpha: Two, k: Real) -> Scalar:
     """The denominator of `over_ggx`."""
-    square = _square(w, alpha)
+    square = _squares.scaled_square(w, alpha)
     t = stable.sqrt(square + w[2] ** 2)
     below = w[2] < 0
     return jnp.where(below, square / jnp.where(below, t - w[2], 1), t + k * w[2])  # t + z cancels below the horizon
