@@ -99,10 +99,7 @@ def student(x: Scalar, y: Scalar, z: Scalar, ax: Scalar, ay: Scalar, gamma: Scal
     - `longer`: by how much the length of (x, y, z) exceeds 1, which counts four times; a constant to the derivative.
     """
     # With q = z² + ρ/(γ−1) this is (z²/q)^(γ−2) / (π αx αy q²): nothing is divided by z. Its exponent is in two words.
-    zero, g = jnp.zeros_like(z), gamma - 1
-    p = tuple(_pairs.over((c, zero), (a, zero), stable.reciprocal(a)) for c, a in ((x, ax), (y, ay)))
-    share = _pairs.over(_pairs.square_of_pairs(*p), (g, zero), stable.reciprocal(g))
-    (log, log_rest), (q, beyond) = _special.log1p_over_square(share, z)
+    _, (log, log_rest), (q, beyond) = _student_logarithm(x, y, z, ax, ay, gamma)
     exponent, rest = two_product(gamma - 2, log)
     end = jnp.finfo(z.dtype).maxexp
     seen = ~(exponent > 4 * end)  # beyond, D is 0 in the dtype
@@ -116,29 +113,49 @@ def student(x: Scalar, y: Scalar, z: Scalar, ax: Scalar, ay: Scalar, gamma: Scal
     return jnp.where(q == jnp.inf, 0, (near / (ax * q)) * (far / (math.pi * (ay * q))))
 
 
+def _student_logarithm(x, y, z, ax, ay, gamma):
+    """ρ/(γ−1) and log(q/z²) in two words, and q with its rest as a share of it."""
+    zero, g = jnp.zeros_like(z), gamma - 1
+    p = tuple(_pairs.over((c, zero), (a, zero), stable.reciprocal(a)) for c, a in ((x, ax), (y, ay)))
+    share = _pairs.over(_pairs.square_of_pairs(*p), (g, zero), stable.reciprocal(g))
+    return share, *_special.log1p_over_square(share, z)
+
+
 def _student_parts(x, y, z, ax, ay, gamma):
-    """-log(z²/q), ρ/(γ−1) and q."""
-    rest, z_square = ((x / ax) ** 2 + (y / ay) ** 2) / (gamma - 1), z * z
-    near = rest < z_square
-    # log1p keeps the lobe's digits; towards the horizon ρ/z² would overflow.
-    logarithm = jnp.where(
-        near,
-        jnp.log1p(jnp.where(near, rest, 0) / jnp.where(near, z_square, 1)),
-        jnp.log(z_square + rest) - 2 * jnp.log(z),
-    )
-    return logarithm, rest, z_square + rest
+    """q, and the share of it that is ρ/(γ−1)."""
+    rest = ((x / ax) ** 2 + (y / ay) ** 2) / (gamma - 1)
+    q = z * z + rest
+    return q, rest / q
+
+
+@jax.custom_jvp
+def _by_gamma(x, y, z, ax, ay, gamma):
+    """h/(γ−1) − (log(q/z²) − h), h the share of ρ/(γ−1) in q: what cancels here cancels in two words."""
+    rest, log, total = _student_logarithm(x, y, z, ax, ay, gamma)
+    # In one pass: computed again for the value, and contracted otherwise there, the words would not belong together.
+    a, b, c, d, q, low = stable.one_loop(*rest, *log, *total)
+    share = _pairs.over((a, b), (q, q * low), stable.reciprocal(q))
+    by_exponent = _pairs.over(share, (gamma - 1, jnp.zeros_like(q)), stable.reciprocal(gamma - 1))
+    change = _pairs.rounded(_pairs.total(by_exponent, _pairs.less(share, (c, d))))
+    beyond = jnp.where(q < jnp.inf, 1 / (gamma - 1) + 1 - c, 0)  # where h is 1; at infinity D is 0
+    return jnp.where(q < 1e37, change, beyond)
+
+
+@_by_gamma.defjvp
+def _by_gamma_jvp(primals, tangents):
+    z, g = primals[2], primals[-1] - 1
+    (q, share), (dq, dshare) = jax.jvp(_student_parts, primals, tangents)
+    return _by_gamma(*primals), dshare * (1 + 1 / g) - share / g * (tangents[-1] / g) - (dq / q - 2 * tangents[2] / z)
 
 
 @student.defjvp
 def _student_jvp(primals, tangents):
     """Each partial derivative as the value times a quotient, and what cancels by z and γ collected."""
     (x, y, z, ax, ay, gamma, _), (dx, dy, dz, dax, day, dgamma, _) = primals, tangents
-    value, (logarithm, rest, q) = student(*primals), _student_parts(*primals[:6])
-    g, share = gamma - 1, rest / q
-    # log(1/(1 − h)) − h, by its series where the terms cancel.
-    powers = sum(share**k / k for k in range(3, 18))
-    beyond = jnp.where(share < 0.1, share**2 / 2 + powers, logarithm - share)
-    change = value * (share / g - beyond) * dgamma + value * (2 * ((gamma - 2) * share - 2 * z * (z / q)) / z) * dz
+    value, (q, share) = student(*primals), _student_parts(*primals[:6])
+    g = gamma - 1
+    change = value * _by_gamma(*primals[:6]) * dgamma
+    change = change + value * (2 * ((gamma - 2) * share - 2 * z * (z / q)) / z) * dz
     for c, a, dc, da in ((x, ax, dx, dax), (y, ay, dy, day)):
         p = c / a
         slope = 2 * gamma * (p / (g * q))
