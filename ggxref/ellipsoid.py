@@ -329,8 +329,12 @@ def projected_area(w: Vec3, A: Mat3, size: Real) -> Scalar:
 
 
 @jax.custom_jvp
-def _lune_sum(au: _pairs.Pairs, av: _pairs.Pairs) -> tuple[Scalar, Scalar]:
+def _lune_sum(
+    au: _pairs.Pairs, av: _pairs.Pairs, A: Mat3, u: tuple[Scalar, ...], v: tuple[Scalar, ...]
+) -> tuple[Scalar, Scalar]:
     r"""$T = \|Au\|\|Av\| + Au\cdot Av$, the factor of every lune, and $T/\|Av\|$, each rounded once; exact also where $Au \approx -Av$.
+
+    - `au`, `av`: `A u` and `A v`. Derivatives are by the others.
 
     There the sum cancels, and $\|Au \times Av\|^2 / (\|Au\|\|Av\| - Au\cdot Av)$ does not, of vectors in two words: rounded, they
     would have lost the angle between them.
@@ -339,7 +343,7 @@ def _lune_sum(au: _pairs.Pairs, av: _pairs.Pairs) -> tuple[Scalar, Scalar]:
 
 
 def _lune_sum_and_normal(au, av):
-    """The two of `_lune_sum`, then ‖Au‖, ‖Av‖ and Au × Av."""
+    """The two of `_lune_sum`, then Au × Av, and ‖Au‖ and ‖Av‖ in two words."""
     u_length, v_length = (_length_of_pairs(a) for a in (au, av))
     product, n = _pairs.product(u_length, v_length), _pairs.cross_of_pairs(au, av)
     cosine, rest = _pairs.dot_of_pairs(au, tuple(value for value, _ in av))
@@ -351,27 +355,42 @@ def _lune_sum_and_normal(au, av):
     conjugate = _pairs.over(_pairs.square_of_pairs(*n), divisor, stable.reciprocal(divisor[0]))
     total = _pairs.choice(obtuse, conjugate, _pairs.total(product, cosine))
     ratio = _pairs.over(total, v_length, stable.reciprocal(v_length[0]))
-    total, ratio, u_length, v_length = map(_pairs.rounded, (total, ratio, u_length, v_length))
-    return total, ratio, u_length, v_length, tuple(map(_pairs.rounded, n))
+    return _pairs.rounded(total), _pairs.rounded(ratio), tuple(map(_pairs.rounded, n)), u_length, v_length
 
 
 @_lune_sum.defjvp
 def _lune_sum_jvp(primals, tangents):
-    r"""Of T by $u$: $\|v\|\hat u + v = (T u + n \times u)/\|u\|^2$, $n = u \times v$, whose terms are perpendicular; $T/\|v\|$ keeps,
-    by v, only the second."""
-    total, ratio, u_length, v_length, n = _lune_sum_and_normal(*primals)
-    total, ratio, u_length, v_length, *n = stable.one_loop(total, ratio, u_length, v_length, *n)
-    (u, v), (du, dv) = ([[value for value, _ in a] for a in pair] for pair in (primals, tangents))
+    r"""With $a = Au$, $b = Av$, $n = a \times b$: by a, of T, $\|b\| h$ with $h = \hat a + \hat b = (T\hat a + n \times \hat a)/(\|a\|\|b\|)$, whose
+    terms are perpendicular; by A, $h\,(\|b\| u + \|a\| v)^T$, in two words, as it cancels where $u \approx -v$. $T/\|b\|$ keeps, by b, only
+    what is perpendicular to it."""
+    (au, av, A, u, v), (_, _, dA, du, dv) = primals, tangents
+    total, ratio, n, a_length, b_length = _lune_sum_and_normal(au, av)
+    s = [_weighted((x, b_length), (y, a_length)) for x, y in zip(u, v, strict=True)]
+    a_length, b_length = map(_pairs.rounded, (a_length, b_length))
+    total, ratio, a_length, b_length, *rest = stable.one_loop(total, ratio, a_length, b_length, *n, *s)
+    n, s = rest[:3], rest[3:]
+    a, b = ([value / norm for value, _ in pair] for pair, norm in ((au, a_length), (av, b_length)))
+    product = a_length * b_length
+    h = [(total * c + d) / product for c, d in zip(a, _plain_cross(n, a), strict=True)]
+    by_a, by_A = b_length * _plain_dot(h, times(A, *du)), _plain_dot(h, times(dA, *s))
+    db = times(A, *dv)
+    across = -_plain_dot(_plain_cross(n, b), db) / b_length
+    by_total = by_a + by_A + across + ratio * _plain_dot(b, db)
+    return (total, ratio), (by_total, (by_a + by_A + across - ratio * _plain_dot(b, times(dA, *v))) / b_length)
 
-    def along(a, da):
-        return a[0] * da[0] + a[1] * da[1] + a[2] * da[2]
 
-    def across(a, da):
-        x, y, z = (n[j] * a[k] - n[k] * a[j] for j, k in ((1, 2), (2, 0), (0, 1)))
-        return along((x, y, z), da)
+def _weighted(*terms):
+    """Sum of numbers times numbers in two words, rounded once."""
+    value, rest = _pairs.dot(tuple(x for x, _ in terms), tuple(weight for _, (weight, _) in terms))
+    return value + (rest + sum(x * low for x, (_, low) in terms))
 
-    by_u, by_v = (total * along(u, du) + across(u, du)) / u_length**2, -across(v, dv) / v_length**2
-    return (total, ratio), (by_u + by_v + ratio * along(v, dv) / v_length, (by_u + by_v) / v_length)
+
+def _plain_dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _plain_cross(a, b):
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @stable.widened
@@ -384,7 +403,8 @@ def lune_area(u: Vec3, v: Vec3, A: Mat3, size: Real) -> Scalar:
     walter2014 (28).
     """
     A, scale = near_one(A)
-    _, ratio = _lune_sum(_pairs.times(A, tuple(u)), _pairs.times(A, tuple(v)))
+    x, y = tuple(u), tuple(v)
+    _, ratio = _lune_sum(_pairs.times(A, x), _pairs.times(A, y), A, x, y)
     return math.pi * (size * scale) ** 2 * ratio / (2 * jnp.abs(determinant(A)))
 
 
@@ -406,6 +426,7 @@ def sigma(w: Vec3, A: Mat3) -> Scalar:
     """
     A, _ = near_one(A)
     x, y, z = A[:, 2]
-    zero = jnp.zeros_like(z)
-    total, _ = _lune_sum(_pairs.times(A, tuple(w)), ((x, zero), (y, zero), (z, zero)))
+    ray, zero = tuple(w), jnp.zeros_like(z)
+    n = zero, zero, jnp.ones_like(z)
+    total, _ = _lune_sum(_pairs.times(A, ray), ((x, zero), (y, zero), (z, zero)), A, ray, n)
     return total / (2 * normal_square(A))
