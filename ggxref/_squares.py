@@ -21,7 +21,7 @@ def stretched_square(w: Vec3, alpha: Vec2) -> Scalar:
 
 
 @widened
-def scaled_square(w: Vec3, alpha: Vec2) -> Scalar:
+def scaled_square(w: Vec3 | tuple[Scalar, ...], alpha: Vec2 | tuple[Scalar, ...]) -> Scalar:
     r"""$\alpha_x^2 x^2 + \alpha_y^2 y^2$, rounded once: plainly, half of Λ's error."""
     return _scaled_square(w[0], w[1], alpha[0], alpha[1])
 
