@@ -48,13 +48,18 @@ def total(a: Pair, b: Pair) -> Pair:
 
 def less(a: Pair, b: Pair) -> Pair:
     """`a - b`."""
-    return total(a, (-b[0], -b[1]))
+    return total(a, minus(b))
 
 
 def product(a: Pair, b: Pair) -> Pair:
     """`a b`."""
     value, rest = two_product(a[0], b[0])
     return value, rest + (a[0] * b[1] + a[1] * b[0])
+
+
+def minus(a: Pair) -> Pair:
+    """`-a`."""
+    return -a[0], -a[1]
 
 
 def scaled(a: Pair, factor: Real) -> Pair:
@@ -75,7 +80,7 @@ def rows(A: Mat3) -> tuple[Triple, Triple, Triple]:
 
 def cross(a: tuple[Scalar, ...], b: tuple[Scalar, ...]) -> Pairs:
     """`a × b`."""
-    x, y, z = (dot((a[j], a[k]), (b[k], -b[j])) for j, k in ((1, 2), (2, 0), (0, 1)))
+    x, y, z = (_evened(*dot((a[j], a[k]), (b[k], -b[j]))) for j, k in ((1, 2), (2, 0), (0, 1)))
     return x, y, z
 
 
@@ -101,6 +106,12 @@ def _evened(value: Scalar, rest: Scalar) -> Pair:
     """The pair of that sum: where the values cancelled, the rest is as large."""
     total = value + rest
     return total, lax.stop_gradient((value - total) + rest)
+
+
+def inner(a: Pairs, b: Pairs) -> Pair:
+    """`a · b` of two such."""
+    value, rest = dot_of_pairs(a, (b[0][0], b[1][0], b[2][0]))
+    return value, rest + (a[0][0] * b[0][1] + a[1][0] * b[1][1] + a[2][0] * b[2][1])
 
 
 def times(A: Mat3, w: Triple) -> Pairs:
@@ -157,3 +168,21 @@ def root(a: Pair, inverse: Scalar) -> Pair:
     value = a[0] * inverse
     product, error = two_product(value, value)
     return value, (((a[0] - product) - error) + a[1]) * (inverse / 2)
+
+
+def ratio(a: Pair, b: Pair) -> Pair:
+    """`a / b`, `b` from 1e-37 to 1e37."""
+    return over(a, b, stable.reciprocal(b[0]))
+
+
+def square_root(a: Pair) -> Pair:
+    """The square root; 0 for what rounding made negative."""
+    zero = jnp.zeros_like(a[0])
+    a = choice(a[0] > 0, a, (zero, zero))
+    return root(a, stable.rsqrt(a[0]))
+
+
+def one_pass(*pairs: Pair) -> tuple[Pair, ...]:
+    """`stable.one_loop` of pairs."""
+    flat = stable.one_loop(*(word for pair in pairs for word in pair))
+    return tuple(zip(flat[::2], flat[1::2], strict=True))

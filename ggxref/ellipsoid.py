@@ -47,8 +47,7 @@ def length(x: Real, y: Real, z: Real) -> Scalar:
 
 
 def _length_of_pairs(a: _pairs.Pairs) -> _pairs.Pair:
-    square = _pairs.square_of_pairs(*a)
-    return _pairs.root(square, stable.rsqrt(square[0]))
+    return _pairs.square_root(_pairs.square_of_pairs(*a))
 
 
 def normal_square(A: Mat3) -> Scalar:
@@ -94,12 +93,15 @@ def shape_matrix(alpha: Vec2, angles: Vec3) -> Mat3:
 
 
 def _beside_the_pole(A):
-    """|a3|², e, and a1 x a3 and a2 x a3 of A's columns: |a3| times the parts of a1 and a2 perpendicular to a3, turned."""
+    """|a3|², e, and a1 x a3 and a2 x a3 of A's columns: |a3| times the parts of a1 and a2 perpendicular to a3, turned; in two words.
+
+    In small passes: XLA does not vectorise a loop of so many results that does all of it.
+    """
     a1, a2, a3 = (tuple(A[i, j] for i in range(3)) for j in range(3))
-    square = _pairs.rounded(_pairs.dot(a3, a3))
-    ex, ey = (_pairs.rounded(_pairs.dot(a, a3)) / square for a in (a1, a2))
-    n1, n2 = (tuple(map(_pairs.rounded, _pairs.cross(a, a3))) for a in (a1, a2))
-    return square, ex, ey, n1, n2
+    square = _pairs.dot(a3, a3)
+    square, ex, ey = _pairs.one_pass(square, *(_pairs.ratio(_pairs.dot(a, a3), square) for a in (a1, a2)))
+    x1, y1, z1, x2, y2, z2 = _pairs.one_pass(*_pairs.cross(a1, a3), *_pairs.cross(a2, a3))
+    return square, ex, ey, (x1, y1, z1), (x2, y2, z2)
 
 
 class Canonical(NamedTuple):
@@ -123,23 +125,22 @@ def _canonical_terms(A):
 
 
 def _canonical_and_normal(A):
-    """The five numbers, then a1 x a3 of A's columns, and c11 with the sign of det A."""
+    """The five numbers, each rounded once, then a1 x a3 of A's columns, and c11 with the sign of det A."""
     square, ex, ey, n1, n2 = _beside_the_pole(A)
-    # In small passes: XLA does not vectorise a loop of so many results that does all of it.
-    (square, ex, ey), minors = stable.one_loop(square, ex, ey), stable.one_loop(*n1, *n2)
-    n1, n2 = minors[:3], minors[3:]
-    n1_length = length(*n1)
-    c10 = _pairs.rounded(_pairs.dot(n1, n2)) / (n1_length * square)
-    c11 = determinant(A) / (n1_length * jnp.sqrt(square))
-    return Canonical(n1_length / square, c10, jnp.abs(c11), ex, ey), n1, c11
+    n1_length, along = _pairs.one_pass(_length_of_pairs(n1), _pairs.inner(n1, n2))
+    (det,) = _pairs.one_pass(_pairs.determinant(A))
+    c00 = _pairs.ratio(n1_length, square)
+    c10 = _pairs.ratio(along, _pairs.product(n1_length, square))
+    c11 = _pairs.ratio(det, _pairs.product(n1_length, _pairs.square_root(square)))
+    c00, c10, c11, ex, ey = stable.one_loop(*map(_pairs.rounded, (c00, c10, c11, ex, ey)))
+    return Canonical(c00, c10, jnp.abs(c11), ex, ey), tuple(map(_pairs.rounded, n1)), c11
 
 
 @_canonical_terms.defjvp
 def _canonical_terms_jvp(primals, tangents):
     r"""With $A = \|A n\|\,Q M$, Q orthogonal and M canonical: what $Q^T dA/\|A n\|$ is beyond a turn and a scale of M."""
     (A,), (dA,) = primals, tangents
-    terms, n1, signed = _canonical_and_normal(A)
-    c00, c10, c11, ex, ey, signed, *n1 = stable.one_loop(*terms, signed, *n1)
+    (c00, c10, c11, ex, ey), n1, signed = _canonical_and_normal(A)
     norm, up, (x, y, z) = length(*A[:, 2]), stable.unit(*A[:, 2]), stable.unit(*n1)
     q1 = up[1] * z - up[2] * y, up[2] * x - up[0] * z, up[0] * y - up[1] * x
     q2 = tuple(jnp.where(signed < 0, c, -c) for c in (x, y, z))
@@ -171,7 +172,7 @@ def _canonical_frame(A):
     terms, n1, signed = _canonical_and_normal(A)
     side = jnp.where(signed < 0, -1, 1).astype(signed.dtype)
     side, cosine, sine = stable.one_loop(side, *_second_row(A, n1, side))
-    return Canonical(*stable.one_loop(*terms)), side, (cosine, sine)
+    return terms, side, (cosine, sine)
 
 
 def _second_row(A, n1, side):
@@ -200,6 +201,8 @@ def canonical(A: Mat3) -> Mat3:
 
     `C` is lower triangular with a positive diagonal: five numbers, unique, with no degenerate angle. Scale by
     $1/\|A n\|$, rotate $A n$ onto n.
+
+    Each is rounded once; the form of a canonical `A` is `A` itself.
 
     Gram–Schmidt from the third column on: $\Sigma = C C^T$ by subtraction, $S - e e^T$, loses the digits that a strong
     skew shares with `e`.
@@ -239,8 +242,9 @@ def from_slopes(mean: Vec2, scatter: Mat2) -> Mat3:
 def to_slopes(A: Mat3) -> tuple[Vec2, Mat2]:
     """The `(mean, scatter)` of `from_slopes` for any `A`: (2,) and (2, 2)."""
     square, ex, ey, n1, n2 = _beside_the_pole(near_one(A)[0])
+    square, ex, ey = map(_pairs.rounded, (square, ex, ey))
     # Not by C, whose parts turn with the ellipse where it is nearly a line.
-    xx, xy, yy = (_pairs.rounded(_pairs.dot(a, b)) / square / square for a, b in ((n1, n1), (n1, n2), (n2, n2)))
+    xx, xy, yy = (_pairs.rounded(_pairs.inner(a, b)) / square / square for a, b in ((n1, n1), (n1, n2), (n2, n2)))
     return -jnp.stack([ex, ey]), jnp.stack([jnp.stack([xx, xy]), jnp.stack([xy, yy])])
 
 
@@ -346,15 +350,14 @@ def _lune_sum_and_normal(au, av):
     """The two of `_lune_sum`, then Au × Av, and ‖Au‖ and ‖Av‖ in two words."""
     u_length, v_length = (_length_of_pairs(a) for a in (au, av))
     product, n = _pairs.product(u_length, v_length), _pairs.cross_of_pairs(au, av)
-    cosine, rest = _pairs.dot_of_pairs(au, tuple(value for value, _ in av))
-    cosine = cosine, rest + sum(value * rest for (value, _), (_, rest) in zip(au, av, strict=True))
+    cosine = _pairs.inner(au, av)
     # Down to 110° the sum keeps its digits better.
     obtuse = cosine[0] < -product[0] / 3
     zero, one = jnp.zeros_like(product[0]), jnp.ones_like(product[0])
     divisor = _pairs.choice(obtuse, _pairs.less(product, cosine), (one, zero))
-    conjugate = _pairs.over(_pairs.square_of_pairs(*n), divisor, stable.reciprocal(divisor[0]))
+    conjugate = _pairs.ratio(_pairs.square_of_pairs(*n), divisor)
     total = _pairs.choice(obtuse, conjugate, _pairs.total(product, cosine))
-    ratio = _pairs.over(total, v_length, stable.reciprocal(v_length[0]))
+    ratio = _pairs.ratio(total, v_length)
     return _pairs.rounded(total), _pairs.rounded(ratio), tuple(map(_pairs.rounded, n)), u_length, v_length
 
 
