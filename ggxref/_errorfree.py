@@ -37,14 +37,14 @@ def two_product(a, b):
 def two_sum(a, b):
     """`a + b`, rounded, and the rest (Knuth 1969)."""
     s = a + b
-    t = s - a
-    return s, (a - (s - t)) + (b - t)
+    t = a - s  # not s - a: of (b + 1) - 1 XLA makes b
+    return s, (a - (s + t)) + (b + t)
 
 
 def fast_two_sum(a, b):
     """As `two_sum`, where `a` is the larger one (Dekker 1971)."""
     total = a + b
-    return total, b - (total - a)
+    return total, (a - total) + b  # as above
 
 
 @traced_once

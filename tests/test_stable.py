@@ -10,7 +10,7 @@ from flint import arb
 from library import numbers
 
 from ggxref import _special, _squares, bsdf, fresnel, geometry, ndf, stable
-from ggxref._errorfree import two_product
+from ggxref._errorfree import fast_two_sum, two_product, two_sum
 from ggxref.oracle.precision import working
 from ggxref.sampling import ellipsoid_cap, normals
 
@@ -202,6 +202,16 @@ def test_azimuth(dtype):
     np.testing.assert_allclose(np.arctan2(s, c), np.arctan2(y, x), atol=4 * epsilon(dtype))
     zero = jnp.zeros((), dtype)
     assert stable.azimuth(zero, zero, pole=(0.0, -1.0)) == (0, -1)
+
+
+def test_sums_with_a_constant_keep_their_rest(dtype):
+    """XLA makes one of the constants of a sum: of (x + 1) - 1, x."""
+    x = (np.exp(rng().uniform(-12, 0, N)) * rng().choice([-1, 1], N)).astype(dtype)
+    forms = (lambda x: two_sum(jnp.ones_like(x), x), lambda x: two_sum(x, jnp.ones_like(x)),
+             lambda x: fast_two_sum(jnp.ones_like(x), x))  # fmt: skip
+    for form in forms:
+        pairs = zip(*map(rational, jax.jit(form)(x)), strict=True)
+        assert [value + rest for value, rest in pairs] == [1 + c for c in rational(x)]
 
 
 def test_cos_sin_turn(dtype):
