@@ -138,32 +138,53 @@ def _canonical_and_normal(A):
 
 @_canonical_terms.defjvp
 def _canonical_terms_jvp(primals, tangents):
-    r"""With $A = \|A n\|\,Q M$, Q orthogonal and M canonical: what $Q^T dA/\|A n\|$ is beyond a turn and a scale of M."""
+    """The numbers' changes, and a turn about n that keeps the one below c00 at 0."""
     (A,), (dA,) = primals, tangents
-    (c00, c10, c11, ex, ey), n1, signed = _canonical_and_normal(A)
-    norm, up, (x, y, z) = length(*A[:, 2]), stable.unit(*A[:, 2]), stable.unit(*n1)
+    terms, n1, signed = _canonical_and_normal(A)
+    change, lower = _change(A, dA, terms, jnp.zeros_like(signed), _frame(A, n1, signed))
+    turn = lower / terms.c00
+    return terms, change._replace(c10=change.c10 + terms.c11 * turn, c11=change.c11 - terms.c10 * turn)
+
+
+def _frame(A, n1, signed):
+    r"""The columns of Q in $A = \|A n\|\,Q M$, Q orthogonal and M canonical."""
+    up, (x, y, z) = stable.unit(*A[:, 2]), stable.unit(*n1)
     q1 = up[1] * z - up[2] * y, up[2] * x - up[0] * z, up[0] * y - up[1] * x
-    q2 = tuple(jnp.where(signed < 0, c, -c) for c in (x, y, z))
-    g = [[(q[0] * a[0] + q[1] * a[1] + q[2] * a[2]) / norm for a in dA.T] for q in (q1, q2, up)]
+    return q1, tuple(jnp.where(signed < 0, c, -c) for c in (x, y, z)), up
+
+
+def _change(A, dA, terms, lower, frame):
+    r"""What $Q^T dA/\|A n\|$ is beyond a scale of M and a turn of n: of the five numbers, and of `lower`, the 0 below c00."""
+    c00, c10, c11, ex, ey = terms
+    norm = length(*A[:, 2])
+    g = [[(q[0] * a[0] + q[1] * a[1] + q[2] * a[2]) / norm for a in dA.T] for q in frame]
     (g11, g12, g13), (g21, g22, g23), (g31, g32, g33) = g
-    turn = (g21 - ex * g23) / c00
-    changes = (
+    change = Canonical(
         g11 - ex * g13 - c00 * g33,
-        g12 - ey * g13 - c10 * g33 + c11 * turn,
-        g22 - ey * g23 - c11 * g33 - c10 * turn,
-        g31 - ex * g33 + c00 * g13,
+        g12 - ey * g13 - c10 * g33,
+        g22 - ey * g23 - c11 * g33,
+        g31 - ex * g33 + c00 * g13 + lower * g23,
         g32 - ey * g33 + c10 * g13 + c11 * g23,
     )
-    return Canonical(c00, c10, c11, ex, ey), Canonical(*changes)
+    return change, g21 - ex * g23 - lower * g33
 
 
-Frame = tuple[Canonical, Scalar, tuple[Scalar, Scalar]]
+class Frame(NamedTuple):
+    """`canonical_terms`; of the turn to them, -1 where it reflects, else 1; and where it takes the second row of `basis(A n)`, the
+    cosine and sine of the azimuth a right angle ahead of it, times a number.
+
+    `lower` is the matrix's 0 below c00. For what does not depend on a turn about n the derivatives are those of a frame that
+    keeps its azimuth, in which this number changes: to keep it 0, a smooth ellipsoid's frame turns by 1/α, which would cancel.
+    """
+
+    terms: Canonical
+    lower: Scalar
+    side: Scalar
+    pole: tuple[Scalar, Scalar]
 
 
 def canonical_frame(A: Mat3) -> Frame:
-    """`canonical_terms`; of the turn to them, -1 where it reflects, else 1; and where it takes the second row of `basis(A n)`, the
-    cosine and sine of the azimuth a right angle ahead of it, times a number. `A`: as `canonical_terms`.
-    """
+    """`Frame` of `A`: as `canonical_terms`."""
     return _canonical_frame(near_one(A)[0])
 
 
@@ -172,7 +193,24 @@ def _canonical_frame(A):
     terms, n1, signed = _canonical_and_normal(A)
     side = jnp.where(signed < 0, -1, 1).astype(signed.dtype)
     side, cosine, sine = stable.one_loop(side, *_second_row(A, n1, side))
-    return terms, side, (cosine, sine)
+    return Frame(terms, jnp.zeros_like(side), side, (cosine, sine))
+
+
+@jax.custom_jvp
+def _steady_frame(A):
+    """`_frame`, whose derivative has no turn about A n."""
+    _, n1, signed = _canonical_and_normal(A)
+    return _frame(A, n1, signed)
+
+
+@_steady_frame.defjvp
+def _steady_frame_jvp(primals, tangents):
+    (A,), (dA,) = primals, tangents
+    q1, q2, up = _steady_frame(A)
+    norm = length(*A[:, 2])
+    x, y = (sum(c * d for c, d in zip(q, dA[:, 2], strict=True)) / norm for q in (q1, q2))
+    dq1, dq2 = (tuple(-t * c for c in up) for t in (x, y))
+    return (q1, q2, up), (dq1, dq2, tuple(x * c + y * d for c, d in zip(q1, q2, strict=True)))
 
 
 def _second_row(A, n1, side):
@@ -188,11 +226,13 @@ def _second_row(A, n1, side):
 
 @_canonical_frame.defjvp
 def _canonical_frame_jvp(primals, tangents):
-    (A,) = primals
-    terms, side, pole = _canonical_frame(A)
-    _, change = _canonical_terms_jvp(primals, tangents)
-    _, turn = jax.jvp(lambda A: _second_row(A, jnp.cross(A[:, 0], A[:, 2]), side), primals, tangents)
-    return (terms, side, pole), (change, jnp.zeros_like(side), turn)
+    (A,), (dA,) = primals, tangents
+    frame = _canonical_frame(A)
+    terms, lower, side, (cosine, sine) = frame
+    change, dlower = _change(A, dA, terms, lower, _steady_frame(A))
+    _, (x, y) = jax.jvp(lambda A: _second_row(A, jnp.cross(A[:, 0], A[:, 2]), side), primals, tangents)
+    turn = dlower / terms.c00
+    return frame, Frame(change, dlower, jnp.zeros_like(side), (x - turn * sine, y + turn * cosine))
 
 
 @stable.widened

@@ -178,9 +178,9 @@ def test_scales_near_the_ends_of_the_range():
 
 def lune_in_one_word(u, wi, A):
     """The lune's sampler with its rests left out."""
-    terms, side, pole = canonical_frame(A)
-    x, y, z = (c for c, _ in lune.to_sphere(wi, terms))
-    return from_sphere(*_lune.plain_point(u, (x, y, z), side, pole), terms)
+    frame = canonical_frame(A)
+    x, y, z = (c for c, _ in lune.to_sphere(wi, frame))
+    return from_sphere(*_lune.plain_point(u, (x, y, z), frame.side, frame.pole), frame.terms)
 
 
 def test_lune_sampler_is_within_two_epsilon():

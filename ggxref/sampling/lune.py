@@ -8,7 +8,7 @@ from jaxtyping import Array, Float, Int
 
 from ggxref import _pairs, _special, stable
 from ggxref._types import Mat3, Scalar, Vec2, Vec3
-from ggxref.ellipsoid import Canonical, canonical_frame, cofactor, length, near_one, reciprocal_scale, times
+from ggxref.ellipsoid import Frame, canonical_frame, cofactor, length, near_one, reciprocal_scale, times
 from ggxref.geometry import basis
 from ggxref.sampling._lune import one_pass, point
 from ggxref.sampling._visible import pdf_ellipsoid as pdf
@@ -21,11 +21,13 @@ def _image(column: tuple[Scalar, ...], p: tuple[_pairs.Pair, ...]) -> Scalar:
     return value + (rest + sum(c * low for c, (_, low) in zip(column, p, strict=True)))
 
 
-def to_sphere(wi: Vec3, A: Canonical) -> tuple[_pairs.Pair, ...]:
+def to_sphere(wi: Vec3, frame: Frame) -> tuple[_pairs.Pair, ...]:
     """`A wi` for a canonical `A`, its largest component near 1."""
-    c00, c10, c11, ex, ey = A
+    c00, c10, c11, ex, ey = frame.terms
     x, y, z = wi
-    i = _pairs.dot((c00, c10), (x, y)), _pairs.dot((c11,), (y,)), _pairs.dot((ex, ey, jnp.ones_like(z)), (x, y, z))
+    across, rest = _pairs.dot((c11,), (y,))
+    across = stable.plus_zero_times(across, frame.lower, x), rest
+    i = _pairs.dot((c00, c10), (x, y)), across, _pairs.dot((ex, ey, jnp.ones_like(z)), (x, y, z))
     scale = reciprocal_scale(functools.reduce(jnp.maximum, (jnp.abs(c) for c, _ in i)))
     return tuple(_pairs.scaled(c, scale) for c in i)
 
@@ -40,10 +42,11 @@ def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:
 
     walter2014 (34)–(46), version 3. Where ω_i = n, (43) leaves e₂ free: it is the second row of `geometry.basis(e3)`.
     """
-    terms, side, pole = canonical_frame(A)
-    x, y, z = point(u, one_pass(*to_sphere(wi, terms)), side, pole)
-    c00, c10, c11, ex, ey = terms
-    return stable.direction(_image((c00, ex), (x, z)), _image((c10, c11, ey), (x, y, z)), _pairs.rounded(z))
+    frame = canonical_frame(A)
+    x, y, z = point(u, one_pass(*to_sphere(wi, frame)), frame.side, frame.pole)
+    c00, c10, c11, ex, ey = frame.terms
+    along = stable.plus_zero_times(_image((c00, ex), (x, z)), frame.lower, y[0])
+    return stable.direction(along, _image((c10, c11, ey), (x, y, z)), _pairs.rounded(z))
 
 
 Tries = Float[Array, "n 2"]
