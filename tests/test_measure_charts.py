@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from ggxref.cli import app
-from ggxref.measure import advice, charts, maps, run, speed, tables, variance
+from ggxref.measure import advice, charts, maps, peers, run, speed, tables, variance
 from ggxref.measure.variants import QUANTITIES
 from ggxref.sampling import spherical_cap
 
@@ -32,6 +32,14 @@ def test_turns_time_every_subject_equally_often_and_tell_fast_from_slow():
     assert calls["short"] > calls["long"] > long.runs  # each as many calls as its turn holds
     assert short.median < long.median
     assert long.best <= long.lower <= long.median <= long.upper
+
+
+def test_a_peer_that_cannot_run_is_left_out(monkeypatch):
+    """Dr.Jit aborts its process when LLVM is too old for it: never this one."""
+    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", "/nowhere")
+    peers.runs.cache_clear()
+    assert peers.mitsuba(16) == {}
+    peers.runs.cache_clear()
 
 
 def test_a_compiled_subject_knows_its_compilation_time():

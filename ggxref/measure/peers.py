@@ -1,6 +1,9 @@
 """Other implementations in the same run: Mitsuba 3 (its LLVM variant) and plain NumPy."""
 
+import functools
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from glob import glob
 
@@ -14,18 +17,32 @@ def mitsuba(points: int, alpha: tuple[float, float] = (0.3, 0.1), seed: int = 0)
 
     It needs the package `mitsuba` and an LLVM library (Debian: libllvm19), found by itself or by DRJIT_LIBLLVM_PATH.
     """
+    return _subjects(*_modules(), points, alpha, np.random.default_rng(seed)) if runs() else {}
+
+
+def _modules():
+    import mitsuba as mi
+
+    mi.set_variant("llvm_ad_rgb")
+    import drjit as dr
+
+    return mi, dr
+
+
+@functools.cache
+def runs() -> bool:
+    """Whether each of Mitsuba's subjects runs: tried in another process, which an LLVM library too old for Dr.Jit aborts."""
     found = sorted(glob("/usr/lib/*/libLLVM-19*.so*"))
     if found:
         os.environ.setdefault("DRJIT_LIBLLVM_PATH", found[0])
-    try:
-        import mitsuba as mi
+    trial = "from ggxref.measure.peers import trial; trial()"
+    return subprocess.run([sys.executable, "-c", trial], capture_output=True, check=False).returncode == 0
 
-        mi.set_variant("llvm_ad_rgb")
-        import drjit as dr
 
-        return _subjects(mi, dr, points, alpha, np.random.default_rng(seed))
-    except (ImportError, RuntimeError):
-        return {}
+def trial() -> None:
+    """Run each of Mitsuba's subjects once."""
+    for call in _subjects(*_modules(), 16, (0.3, 0.1), np.random.default_rng(0)).values():
+        call()
 
 
 def _subjects(mi, dr, points, alpha, rng):
