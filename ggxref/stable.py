@@ -278,6 +278,21 @@ def _turning_jvp(primals, tangents):
 
 
 @jax.custom_jvp
+def rising(high: Bool[Array, ""], x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """`turning` with z, not the length, as the constant, where `high`: what is added to the vector in proportion to z then is, too."""
+    return x, y, z
+
+
+@rising.defjvp
+def _rising_jvp(primals, tangents):
+    (high, x, y, z), (_, dx, dy, dz) = primals, tangents
+    height = jnp.where(high, z, 1)
+    held = lax.stop_gradient(height) / height  # 1, for second derivatives
+    share = jnp.where(high, dz / height, 0)
+    return rising(*primals), (held * (dx - x * share), held * (dy - y * share), jnp.where(high, 0, dz))
+
+
+@jax.custom_jvp
 def plus_zero_times(value: Scalar, zero: Scalar, x: Scalar) -> Scalar:
     """`value + zero x` for a number that is 0 but for its derivative, at no cost to the value."""
     return value

@@ -20,6 +20,8 @@ NAMES = [
     "fresnel.schlick",
     "masking.g1_ggx",
     "masking.g2_height_correlated",
+    "ndf.student_t",
+    "sampling.lune.sample",
     "sampling.spherical_cap.pdf",
     "sampling.spherical_cap.sample",
     "slopes.stretch",

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float, Int
 
 from ggxref import _pairs, _special, stable
 from ggxref._types import Mat3, Scalar, Vec2, Vec3
-from ggxref.ellipsoid import Frame, canonical_frame, cofactor, length, near_one, reciprocal_scale, times
+from ggxref.ellipsoid import Canonical, Frame, canonical_frame, cofactor, length, near_one, reciprocal_scale, times
 from ggxref.geometry import basis
 from ggxref.sampling._lune import one_pass, point
 from ggxref.sampling._visible import pdf_ellipsoid as pdf
@@ -32,6 +32,15 @@ def to_sphere(wi: Vec3, frame: Frame) -> tuple[_pairs.Pair, ...]:
     return tuple(_pairs.scaled(c, scale) for c in i)
 
 
+def _rising(p: _pairs.Pairs, A: Canonical) -> _pairs.Pairs:
+    """The point, as if its height were constant where most of the normal is that height times (ex, ey, 1)."""
+    (x, x_rest), (y, y_rest), (z, z_rest) = p
+    c00, c10, c11, ex, ey = A
+    across = (c00 + jnp.abs(c10) + c11) * (jnp.abs(x) + jnp.abs(y))
+    x, y, z = stable.rising(jnp.abs(z) * (1 + jnp.abs(ex) + jnp.abs(ey)) > across, x, y, z)
+    return (x, x_rest), (y, y_rest), (z, z_rest)
+
+
 @stable.widened
 def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:
     """Draw a point of the disk, compress it to the lune's crescent, lift it to the sphere, map it to the ellipsoid.
@@ -45,6 +54,7 @@ def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:
     frame = canonical_frame(A)
     x, y, z = point(u, one_pass(*to_sphere(wi, frame)), frame.side, frame.pole)
     c00, c10, c11, ex, ey = frame.terms
+    x, y, z = _rising((x, y, z), frame.terms)
     along = stable.plus_zero_times(_image((c00, ex), (x, z)), frame.lower, y[0])
     return stable.direction(along, _image((c10, c11, ey), (x, y, z)), _pairs.rounded(z))
 
