@@ -27,22 +27,40 @@ def refraction(wi: Vec3, wo: Vec3, wm: Vec3, n_i: Real, n_o: Real) -> Scalar:
 
     heitz2014 §2.2 (printed as ∂ω_ht/∂ω_i; the variable is the generated direction ω_o).
     """
-    return _spread(stable.cosine(wi, wm), stable.cosine(wo, wm), jnp.asarray(n_i, wi.dtype), jnp.asarray(n_o, wi.dtype))
+    n_i, n_o = jnp.asarray(n_i, wi.dtype), jnp.asarray(n_o, wi.dtype)
+    return _spread(stable.cosine(wi, wm), stable.cosine(wo, wm), n_i, n_o, _path(wi, wo, wm, n_i, n_o))
 
 
 @jax.custom_jvp
-def _spread(i, o, n_i, n_o):
-    # A plain sum may be contracted to an FMA, which is not 0 where the two terms are opposite.
-    path = stable.dot((n_i, n_o), (i, o))
+def _path(wi, wo, wm, n_i, n_o):
+    """The sum that is squared, for exactly unit `wi` and `wo`, in two words: it cancels, for indices nearly equal all the more."""
+    i, o = (_pairs.product((n, jnp.zeros_like(n)), _cosine(w, wm)) for n, w in ((n_i, wi), (n_o, wo)))
+    return _pairs.rounded(_pairs.total(i, o))
+
+
+def _cosine(w, wm):
+    value, rest = _pairs.dot(tuple(w), tuple(wm))
+    return value, rest - value * stable.excess(w)
+
+
+@_path.defjvp
+def _path_jvp(primals, tangents):
+    (wi, wo, wm, n_i, n_o), (di, do, dm, dn_i, dn_o) = primals, tangents
+    by_i, by_o = n_i * (di @ wm + wi @ dm) + dn_i * (wi @ wm), n_o * (do @ wm + wo @ dm) + dn_o * (wo @ wm)
+    return _path(*primals), by_i + by_o
+
+
+@jax.custom_jvp
+def _spread(i, o, n_i, n_o, path):
     straight = path == 0
     return jnp.where(straight, jnp.inf, n_o**2 * jnp.abs(o) / jnp.where(straight, 1, path) ** 2)
 
 
 @_spread.defjvp
 def _spread_jvp(primals, tangents):
-    """By n_o and o the terms of the quotient rule cancel, wherever n_i ω_i·ω_m is small beside n_o ω_o·ω_m."""
-    (i, o, n_i, n_o), (di, do, dn_i, dn_o) = primals, tangents
-    path, value = stable.dot((n_i, n_o), (i, o)), _spread(*primals)
+    """With the change of `path` in it: by n_o and o the terms of the quotient rule cancel, wherever n_i ω_i·ω_m is small beside n_o ω_o·ω_m."""
+    (i, o, n_i, n_o, path), (di, do, dn_i, dn_o, _) = primals, tangents
+    value = _spread(*primals)
     path = jnp.where(path == 0, 1, path)
     weight = n_o / path * (n_o / path)  # |o| in place of a division by o
     along = weight * jnp.sign(o) * ((n_i * i - n_o * o) / path)

@@ -36,6 +36,7 @@ LARGEST = {
     "ellipsoid.lune_area": 5.5,
     "masking.g1_ggx": 3.4,
     "jacobian.linear": 5.7,
+    "jacobian.refraction": 5.9,
     "ndf.beckmann": 5.6,
     "ndf.student_t": 5.1,
     "sampling.slope_beckmann.pdf": 7.6,
