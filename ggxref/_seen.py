@@ -9,11 +9,14 @@ import math
 
 import jax
 import jax.numpy as jnp
+from jax import Array
 from jax.scipy.special import erfc
+from jaxtyping import Bool
 
-from ggxref import _squares, stable
+from ggxref import _pairs, _squares, stable
 from ggxref._pairs import Triple
-from ggxref._types import Real, Scalar
+from ggxref._types import Mat3, Real, Scalar
+from ggxref.ellipsoid import length, lune_parts, near_one, plain_cross, plain_dot, times, weighted
 
 Two = tuple[Scalar, Scalar]
 
@@ -55,6 +58,67 @@ def _over_ggx_jvp(primals, tangents):
     quotient = cosine / area
     change = _change(primals, tangents, quotient, area, by_z, 1 / t, square / t)
     return quotient, change - quotient * w[2] / area * tangents[3]
+
+
+def over_ellipsoid(w: Triple, m: Triple, A: Mat3, cosine: Scalar, sigma: Scalar) -> Scalar:
+    r"""$\omega\cdot m/\sigma(\omega)$ for the ellipsoid's σ, neither 0. `cosine` is $\omega\cdot m$."""
+    return _over_ellipsoid(w, m, near_one(A)[0], cosine, sigma)
+
+
+@jax.custom_jvp
+def _over_ellipsoid(w, m, A, cosine, sigma):
+    return cosine / sigma
+
+
+@_over_ellipsoid.defjvp
+def _over_ellipsoid_jvp(primals, tangents):
+    r"""By ω, $\omega\times(m\times\nabla\sigma)/\sigma^2$, as σ is $\omega\cdot\nabla\sigma$: two of the three factors turn with the surface."""
+    (w, m, A, _, sigma), (dw, dm, dA, _, _) = primals, tangents
+    h, column, norm = _area_by(w, A)
+    gradient = tuple(plain_dot(h, a) / (2 * norm) for a in A.T)
+    by_w = plain_dot(plain_cross(m, gradient), plain_cross(dw, w)) / sigma
+    x, y, _ = w
+    by_A = (plain_dot(h, x * dA[:, 0] + y * dA[:, 1]) + plain_dot(column, dA[:, 2])) / (2 * norm)
+    quotient = _over_ellipsoid(*primals)
+    return quotient, (by_w + plain_dot(w, dm) - quotient * by_A) / sigma
+
+
+def _area_by(w, A):
+    r"""h, a vector and ‖An‖ =: ‖b‖: σ changes by $h/2\|b\|$ for $a = A\omega$, and by the vector over 2‖b‖ for the third column of A.
+
+    With $h = \hat a + \hat b$ that vector is $z h - (\|a\|/\|b\|)((1 + 2c)\hat b - \hat a)$, $c = \hat a\cdot\hat b$, whose terms cancel where ω
+    is nearly n or -n.
+    """
+    (p, q, r), z = A[:, 2], w[2]
+    zero = jnp.zeros_like(z)
+    a, b = _pairs.times(A, w), ((p, zero), (q, zero), (r, zero))
+    (along, square), (total, _, n, a_length, b_length) = _beside_normal(w, A), lune_parts(a, b)
+    a_length, b_length = _pairs.rounded(a_length), _pairs.rounded(b_length)
+    total, a_length, b_length, longer, *n = stable.one_loop(total, a_length, b_length, 2 * z * along + square, *n)
+    a, b = ([value / norm for value, _ in c] for c, norm in ((a, a_length), (b, b_length)))
+    product = a_length * b_length
+    h = tuple((total * c + d) / product for c, d in zip(a, plain_cross(n, a), strict=True))
+    more = longer / (b_length * (a_length + jnp.abs(z) * b_length))  # ‖a‖/‖b‖ − |z|
+    aside = (2 * c / b_length**2 for c in plain_cross(b, n))  # (‖a‖/‖b‖) (a's direction − c b's)
+    upwards = (2 * total / b_length**2 * c for c in b)
+    column = tuple(jnp.where(z < 0, more * c - t, s - more * c) for c, s, t in zip(h, aside, upwards, strict=True))
+    return h, column, b_length
+
+
+def _beside_normal(w, A):
+    """b·d and ‖d‖² of b = A n and d = A (x, y, 0)."""
+    x, y, _ = w
+    d = [_pairs.rounded(_pairs.dot((row[0], row[1]), (x, y))) for row in A]
+    along = (_pairs.dot(tuple(A[:, j]), tuple(A[:, 2])) for j in (0, 1))
+    return weighted(*zip((x, y), along, strict=True)), plain_dot(d, d)
+
+
+def ellipsoid_hides(w: Triple, A: Mat3) -> Bool[Array, ""]:
+    r"""Whether $\sigma > z$ for an ω above the horizon, without the difference: near n the two agree in all digits."""
+    A, _ = near_one(A)
+    (along, square), z = _beside_normal(w, A), w[2]
+    a_length, b_length = length(*times(A, *w)), length(*A[:, 2])
+    return along * (a_length + 3 * z * b_length) + b_length * square > 0
 
 
 @jax.custom_jvp

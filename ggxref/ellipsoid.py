@@ -383,10 +383,10 @@ def _lune_sum(
     There the sum cancels, and $\|Au \times Av\|^2 / (\|Au\|\|Av\| - Au\cdot Av)$ does not, of vectors in two words: rounded, they
     would have lost the angle between them.
     """
-    return _lune_sum_and_normal(au, av)[:2]
+    return lune_parts(au, av)[:2]
 
 
-def _lune_sum_and_normal(au, av):
+def lune_parts(au, av):
     """The two of `_lune_sum`, then Au × Av, and ‖Au‖ and ‖Av‖ in two words."""
     u_length, v_length = (_length_of_pairs(a) for a in (au, av))
     product, n = _pairs.product(u_length, v_length), _pairs.cross_of_pairs(au, av)
@@ -407,32 +407,32 @@ def _lune_sum_jvp(primals, tangents):
     terms are perpendicular; by A, $h\,(\|b\| u + \|a\| v)^T$, in two words, as it cancels where $u \approx -v$. $T/\|b\|$ keeps, by b, only
     what is perpendicular to it."""
     (au, av, A, u, v), (_, _, dA, du, dv) = primals, tangents
-    total, ratio, n, a_length, b_length = _lune_sum_and_normal(au, av)
-    s = [_weighted((x, b_length), (y, a_length)) for x, y in zip(u, v, strict=True)]
+    total, ratio, n, a_length, b_length = lune_parts(au, av)
+    s = [weighted((x, b_length), (y, a_length)) for x, y in zip(u, v, strict=True)]
     a_length, b_length = map(_pairs.rounded, (a_length, b_length))
     total, ratio, a_length, b_length, *rest = stable.one_loop(total, ratio, a_length, b_length, *n, *s)
     n, s = rest[:3], rest[3:]
     a, b = ([value / norm for value, _ in pair] for pair, norm in ((au, a_length), (av, b_length)))
     product = a_length * b_length
-    h = [(total * c + d) / product for c, d in zip(a, _plain_cross(n, a), strict=True)]
-    by_a, by_A = b_length * _plain_dot(h, times(A, *du)), _plain_dot(h, times(dA, *s))
+    h = [(total * c + d) / product for c, d in zip(a, plain_cross(n, a), strict=True)]
+    by_a, by_A = b_length * plain_dot(h, times(A, *du)), plain_dot(h, times(dA, *s))
     db = times(A, *dv)
-    across = -_plain_dot(_plain_cross(n, b), db) / b_length
-    by_total = by_a + by_A + across + ratio * _plain_dot(b, db)
-    return (total, ratio), (by_total, (by_a + by_A + across - ratio * _plain_dot(b, times(dA, *v))) / b_length)
+    across = -plain_dot(plain_cross(n, b), db) / b_length
+    by_total = by_a + by_A + across + ratio * plain_dot(b, db)
+    return (total, ratio), (by_total, (by_a + by_A + across - ratio * plain_dot(b, times(dA, *v))) / b_length)
 
 
-def _weighted(*terms):
+def weighted(*terms):
     """Sum of numbers times numbers in two words, rounded once."""
     value, rest = _pairs.dot(tuple(x for x, _ in terms), tuple(weight for _, (weight, _) in terms))
     return value + (rest + sum(x * low for x, (_, low) in terms))
 
 
-def _plain_dot(a, b):
+def plain_dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _plain_cross(a, b):
+def plain_cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 

@@ -8,10 +8,11 @@ other side (walter2014 (7)), as transmission needs. All directions are unit, (3,
 
 import jax
 import jax.numpy as jnp
-from jax import lax
+from jax import Array, lax
+from jaxtyping import Bool
 
 from ggxref import _squares, stable
-from ggxref._seen import over_beckmann, over_ggx
+from ggxref._seen import ellipsoid_hides, over_beckmann, over_ellipsoid, over_ggx
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import sigma as sigma_ellipsoid
 from ggxref.slopes import gaussian_tail, sigma_beckmann
@@ -98,11 +99,22 @@ def g1_ellipsoid(w: Vec3, wm: Vec3, A: Mat3) -> Scalar:
 
     walter2014 (6), (7), (32).
     """
-    w_up = _up(w)
-    sigma, z = sigma_ellipsoid(w_up, A), w_up[2]
-    whole = z >= sigma
-    g1 = jnp.where(whole, 1, z / jnp.where(whole, 1, sigma))
-    return _on_front(w, wm, g1)
+    up = _up(w)
+    ray, z, sigma = tuple(up), up[2], sigma_ellipsoid(up, A)
+    least = jnp.finfo(sigma.dtype).tiny
+    share = over_ellipsoid(ray, _n(z), A, z, jnp.where(sigma < least, least, sigma))
+    return _on_front(w, wm, _at_most_one(share, ellipsoid_hides(ray, A)))
+
+
+@jax.custom_jvp
+def _at_most_one(x: Scalar, below: Bool[Array, ""]) -> Scalar:
+    """The smaller of `x` and 1; `below`, whether x is, is the derivative's alone: next to the kink rounding decides x."""
+    return jnp.where(x >= 1, 1, x)
+
+
+@_at_most_one.defjvp
+def _at_most_one_jvp(primals, tangents):
+    return _at_most_one(*primals), jnp.where(primals[1], tangents[0], 0)
 
 
 def g2_separable(g1_i: Real, g1_o: Real) -> Scalar:

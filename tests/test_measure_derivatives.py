@@ -38,6 +38,13 @@ def test_well_conditioned_derivatives_keep_four_digits(name):
         assert proof(name, function, arguments(function), region, 4).max() < EXACT
 
 
+def test_the_side_of_a_kink_is_decided_in_all_digits():
+    """Of `g1_ellipsoid` at n, where float32's quotient is 1 on either side."""
+    g1 = library("masking.g1_ellipsoid")
+    found = measure("masking.g1_ellipsoid", g1, arguments(g1), "near_normal", COUNT)
+    assert found.worst < LIMIT and found.ill < COUNT / 2, found
+
+
 def plain_g1(w, wm, alpha):
     stretched = jnp.sqrt((alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2 + w[2] ** 2)
     return jnp.where(wm @ w > 0, 2 * w[2] / (w[2] + stretched), 0)

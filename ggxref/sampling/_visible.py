@@ -6,7 +6,7 @@ One density a normal distribution, whatever the sampler. heitz2014 (2), (5); dup
 import jax.numpy as jnp
 
 from ggxref import ndf, slopes, stable
-from ggxref._seen import over_beckmann, over_ggx
+from ggxref._seen import over_beckmann, over_ellipsoid, over_ggx
 from ggxref._types import Mat3, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import sigma as sigma_ellipsoid
 
@@ -49,4 +49,5 @@ def pdf_ellipsoid(wm: Vec3, wi: Vec3, A: Mat3) -> Scalar:
     """
     cosine, sigma = stable.cosine(wi, wm), sigma_ellipsoid(wi, A)
     seen = ~((cosine <= 0) | (sigma < jnp.finfo(sigma.dtype).tiny))
-    return jnp.where(seen, ndf.ellipsoid(wm, A) * (cosine / jnp.where(seen, sigma, 1)), 0)
+    share = over_ellipsoid(tuple(wi), tuple(wm), A, cosine, jnp.where(seen, sigma, 1))
+    return jnp.where(seen, ndf.ellipsoid(wm, A) * share, 0)
