@@ -68,8 +68,9 @@ def _bell_jvp(primals, tangents):
     D, q = _bell(*primals), 1 + u * u + v * v
     by_v = 4 * v / q
     by_u = 4 * u / q - by_v * (c / b)
-    across = (D * (by_v * v - 1) / b) * db - (D * by_v / b) * dy + (D * (by_v * u) / b) * dc
-    return D, across + (D * (by_u * u - 1) / a) * da - (D * by_u / a) * dx
+    # Quotients by a and b first: D times a small factor may underflow.
+    across = (D * ((by_v * v - 1) / b)) * db - (D * (by_v / b)) * dy + (D * (by_v / b * u)) * dc
+    return D, across + (D * ((by_u * u - 1) / a)) * da - (D * (by_u / a)) * dx
 
 
 @stable.widened
