@@ -49,28 +49,30 @@ def _stretched_square(slope, alpha):
 @stable.widened
 def ggx(slope: Vec2, alpha: Vec2) -> Scalar:
     r"""$P^{22} = 1 / (\pi\alpha_x\alpha_y (1 + \tilde x^2/\alpha_x^2 + \tilde y^2/\alpha_y^2)^2)$. heitz2014 §5."""
-    return _bell(slope[0], slope[1], alpha[0], alpha[1], jnp.zeros_like(slope[0]))
+    zero = jnp.zeros_like(slope[0])
+    return _bell(slope[0], slope[1], alpha[0], alpha[1], zero, zero + 1)
 
 
 @jax.custom_jvp
-def _bell(x, y, a, b, c):
-    r"""$1/(\pi a b (1 + u^2 + v^2)^2)$ with $u = x/a$, $v = (y - c u)/b$. Its derivatives do not underflow before it does."""
+def _bell(x, y, a, b, c, factor):
+    r"""$f/(\pi a b (1 + u^2 + v^2)^2)$ with $u = x/a$, $v = (y - c u)/b$. Its derivatives do not underflow before it does."""
     u = x / a
     v = (y - c * u) / b
-    return _squares.lobe(a, b, 1 + u * u + v * v)
+    return factor * _squares.lobe(a, b, 1 + u * u + v * v)
 
 
 @_bell.defjvp
 def _bell_jvp(primals, tangents):
-    (x, y, a, b, c), (dx, dy, da, db, dc) = primals, tangents
+    (x, y, a, b, c, factor), (dx, dy, da, db, dc, dfactor) = primals, tangents
     u = x / a
     v = (y - c * u) / b
-    D, q = _bell(*primals), 1 + u * u + v * v
+    value, q = _bell(*primals), 1 + u * u + v * v
     by_v = 4 * v / q
     by_u = 4 * u / q - by_v * (c / b)
-    # Quotients by a and b first: D times a small factor may underflow.
-    across = (D * ((by_v * v - 1) / b)) * db - (D * (by_v / b)) * dy + (D * (by_v / b * u)) * dc
-    return D, across + (D * ((by_u * u - 1) / a)) * da - (D * (by_u / a)) * dx
+    # Quotients by a and b first: the value times a small factor may underflow.
+    across = (value * ((by_v * v - 1) / b)) * db - (value * (by_v / b)) * dy + (value * (by_v / b * u)) * dc
+    along = (value * ((by_u * u - 1) / a)) * da - (value * (by_u / a)) * dx
+    return value, across + along + _bell(x, y, a, b, c, jnp.ones_like(factor)) * dfactor
 
 
 @stable.widened
@@ -171,7 +173,7 @@ def ellipsoid(slope: Vec2, A: Mat3) -> Scalar:
     The bivariate Student-t density with 2 degrees of freedom, location $-e$ and shape Σ/2 (design: canonical form).
     """
     (c00, c10, _), (_, c11, _), (ex, ey, _) = canonical(A)
-    return _bell(slope[0] + ex, slope[1] + ey, c00, c11, c10)
+    return _bell(slope[0] + ex, slope[1] + ey, c00, c11, c10, jnp.ones_like(ex))
 
 
 @stable.widened
@@ -248,7 +250,8 @@ def visible_ggx(slope: Vec2, wi: Vec3, alpha: Vec2) -> Scalar:
     """
     m, factor = _factor(slope, wi)
     share = 2 * over_ggx(tuple(wi), m, tuple(alpha), 1.0, factor)
-    return jnp.where(factor <= 0, 0, share) * ggx(slope, alpha)
+    x, y = slope
+    return _bell(x, y, alpha[0], alpha[1], jnp.zeros_like(x), jnp.where(factor <= 0, 0, share))
 
 
 @stable.widened
