@@ -183,6 +183,6 @@ def square_root(a: Pair) -> Pair:
 
 
 def one_pass(*pairs: Pair) -> tuple[Pair, ...]:
-    """`stable.one_loop` of pairs."""
+    """`stable.one_loop` of pairs. XLA does not vectorise a whole sampler in two words as one loop, nor one of 16 results."""
     flat = stable.one_loop(*(word for pair in pairs for word in pair))
     return tuple(zip(flat[::2], flat[1::2], strict=True))

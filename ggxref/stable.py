@@ -304,20 +304,6 @@ def _plus_zero_times_jvp(primals, tangents):
     return plus_zero_times(value, zero, x), dvalue + (dzero * x + zero * dx)
 
 
-@jax.custom_jvp
-def relative(x: Scalar, length: Scalar) -> Scalar:
-    """`x`, a length beside a vector of that `length` which is `turning`: what changes is their ratio."""
-    return x
-
-
-@relative.defjvp
-def _relative_jvp(primals, tangents):
-    (x, length), (dx, dlength) = primals, tangents
-    x, length = relative(x, length), jnp.where(length > 0, length, 1)
-    held = lax.stop_gradient(length) / length  # 1, for second derivatives
-    return x, held * dx - x * (dlength / length)
-
-
 @widened
 def unit(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     """The components divided by their length; the zero vector stays zero, with a zero gradient.

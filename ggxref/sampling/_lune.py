@@ -9,30 +9,28 @@ import jax.numpy as jnp
 from jax import Array, lax
 from jaxtyping import Bool
 
-from ggxref import _pairs, _special, stable
+from ggxref import _special, stable
 from ggxref._errorfree import two_sum
-from ggxref._pairs import Pair, Pairs, choice, less, over, product, scaled, square_of_pairs, total
+from ggxref._pairs import (
+    Pair,
+    Pairs,
+    choice,
+    less,
+    minus,
+    one_pass,
+    product,
+    ratio,
+    scaled,
+    square_of_pairs,
+    square_root,
+    total,
+)
 from ggxref._types import Scalar, Vec2
 from ggxref.ellipsoid import length, reciprocal_scale
+from ggxref.sampling._ellipsoid import poles
 from ggxref.sampling._sphere import crescent, incident
 
 Two = tuple[Scalar, Scalar]
-
-
-def _root(a: Pair) -> Pair:
-    """The square root; 0 for what rounding made negative."""
-    zero = jnp.zeros_like(a[0])
-    a = choice(a[0] > 0, a, (zero, zero))
-    return _pairs.root(a, stable.rsqrt(a[0]))
-
-
-def _ratio(a: Pair, b: Pair) -> Pair:
-    """`a / b`, `b` from 1e-37 to 1e37."""
-    return over(a, b, stable.reciprocal(b[0]))
-
-
-def _minus(a: Pair) -> Pair:
-    return -a[0], -a[1]
 
 
 def _or_one(condition: Bool[Array, ""], a: Pair) -> Pair:
@@ -51,7 +49,7 @@ def _square(u):
 def _concentric(u: Vec2) -> Pairs:
     """Point of the unit disk and its `1 - r²`: walter2014 (34)–(37) (Shirley & Chiu 1997)."""
     wide, r, other, edge = _square(u)
-    c, s = _special.cos_sin_eighth(_ratio(other, _or_one(r[0] != 0, scaled(r, 8))))
+    c, s = _special.cos_sin_eighth(ratio(other, _or_one(r[0] != 0, scaled(r, 8))))
     rim = product((edge, jnp.zeros_like(edge)), two_sum(jnp.full_like(edge, 2), -edge))
     return product(r, choice(wide, c, s)), product(r, choice(wide, s, c)), rim
 
@@ -62,21 +60,18 @@ def _ray(i: Pairs, pole: Two) -> tuple[Pair, ...]:
     scale = reciprocal_scale(jnp.maximum(jnp.abs(x[0]), jnp.abs(y[0])))
     none, zero = (x[0] == 0) & (y[0] == 0), jnp.zeros_like(x[0])
     X, Y = choice(none, (pole[0], zero), scaled(x, scale)), choice(none, (pole[1], zero), scaled(y, scale))
-    S = _root(square_of_pairs(X, Y))
+    S = square_root(square_of_pairs(X, Y))
     flat = scaled(S, jnp.where(none, 0, reciprocal_scale(scale)))
-    square, norm_square = product(flat, flat), square_of_pairs(flat, z)
-    below = z[0] < 0
-    large = total(_root(norm_square), choice(below, _minus(z), z))
-    small = _ratio(square, large)
-    return X, Y, S, flat, norm_square, choice(below, small, large), choice(below, large, small)
+    norm_square, rise, fall = poles(product(flat, flat), z)
+    return X, Y, S, flat, norm_square, rise, fall
 
 
 def _chord(along: Pair, rim: Pair) -> Pairs:
     """Half of the disk's chord through the point, and the two parts that the point cuts it in."""
-    half = _root(total(rim, product(along, along)))
+    half = square_root(total(rim, product(along, along)))
     up = along[0] > 0
-    far = total(half, choice(up, along, _minus(along)))
-    near = _ratio(rim, _or_one(far[0] > 0, far))
+    far = total(half, choice(up, along, minus(along)))
+    near = ratio(rim, _or_one(far[0] > 0, far))
     return half, choice(up, near, far), choice(up, far, near)
 
 
@@ -84,7 +79,7 @@ def _compressed(half: Pair, below_rim: Pair, above_rim: Pair, z: Pair, rise: Pai
     """The point in i's frame, towards the pole and along `i`, times N; then the height's numerator: walter2014 (38)–(41)."""
     share, level = scaled(product(rise, above_rim), 0.5), product(half, z)
     moved = less(share, level)
-    lifted = _root(product(scaled(product(rise, below_rim), 0.5), total(product(half, fall), share)))
+    lifted = square_root(product(scaled(product(rise, below_rim), 0.5), total(product(half, fall), share)))
     return moved, lifted, product(share, less(level, moved))
 
 
@@ -92,15 +87,9 @@ def _turned(moved: Pair, lifted: Pair, numerator: Pair, z: Pair, flat: Pair, nor
     """The point away from the pole, towards `i`, and its height, both times N²."""
     plus, minus = product(lifted, z), product(moved, flat)
     differ = ((plus[0] > 0) & (minus[0] < 0)) | ((plus[0] < 0) & (minus[0] > 0))  # a sum would cancel
-    quotient = _ratio(numerator, _or_one(differ, less(plus, minus)))
+    quotient = ratio(numerator, _or_one(differ, less(plus, minus)))
     height = choice(differ, product(quotient, norm_square), total(plus, minus))
     return less(product(flat, lifted), product(z, moved)), height
-
-
-def one_pass(*pairs: Pair) -> tuple[Pair, ...]:
-    """`stable.one_loop` of pairs. XLA does not vectorise the whole sampler as one loop, nor one of 16 results."""
-    flat = stable.one_loop(*(word for pair in pairs for word in pair))
-    return tuple(zip(flat[::2], flat[1::2], strict=True))
 
 
 @jax.custom_jvp

@@ -19,15 +19,10 @@ class Incident(NamedTuple):
     fall: Scalar  # 1 - z
 
 
-def ray_factor(x: Scalar, y: Scalar, z: Scalar) -> Scalar:
-    """The factor of `ray`."""
-    return stable.sqrt(x * x + y * y + z * z) + jnp.abs(z)
-
-
 def ray(x: Scalar, y: Scalar, z: Scalar) -> Incident:
     """`incident` times a positive number, ‖v‖ (‖v‖ + |z|) of v = (x, y, z): a half vector needs no more, and no division is left."""
     x, y, z = stable.turning(x, y, z)
-    factor, below = ray_factor(x, y, z), z < 0
+    factor, below = stable.sqrt(x * x + y * y + z * z) + jnp.abs(z), z < 0
     # (‖v‖ + |z|) factor and (‖v‖ - |z|) factor, the latter without its cancellation.
     large, small = factor * factor, x * x + y * y
     rise, fall = jnp.where(below, small, large), jnp.where(below, large, small)

@@ -8,11 +8,18 @@ $o_z' + i_z' \ge i_z/(\|A i\| \max_{\theta\le\theta_1} Q)$. At e = 0 and α ≤ 
 
 import jax.numpy as jnp
 
-from ggxref import _special, ndf, stable
+from ggxref import _pairs, ndf, stable
+from ggxref._pairs import Triple
 from ggxref._seen import area_ggx
 from ggxref._types import Mat3, Scalar, Turn, Vec2, Vec3
 from ggxref.ellipsoid import Canonical, canonical_terms, inverse_square, length, near_one, normal_square
-from ggxref.sampling.ellipsoid_cap import from_sphere, half_vector, to_sphere
+from ggxref.sampling._cap import half_vector
+from ggxref.sampling._ellipsoid import from_sphere, to_sphere
+
+
+def _rounded_to_sphere(wi: Vec3, A: Canonical) -> Triple:
+    x, y, z = map(_pairs.rounded, to_sphere(wi, A))
+    return x, y, z
 
 
 def _largest_q(wi: Vec3, A: Canonical):
@@ -48,7 +55,7 @@ def bound(wi: Vec3, A: Mat3) -> Scalar:
     - `wi`: unit, (3,). `A`: shape matrix, (3, 3), non-singular.
     """
     terms = canonical_terms(A)
-    i = to_sphere(wi, terms)
+    i = _rounded_to_sphere(wi, terms)
     c_square, q = _largest_q(wi, terms)
     # i_z/(‖Aωi‖ Q) − i'_z with i'_z = (e·ωi + i_z)/‖Aωi‖.
     fall = terms.ex * wi[0] + terms.ey * wi[1] + wi[2] * (q / (c_square + q))
@@ -56,15 +63,15 @@ def bound(wi: Vec3, A: Mat3) -> Scalar:
 
 
 @stable.widened
-def sample(u: Vec2, wi: Vec3, A: Mat3, *, turn: Turn = _special.cos_sin_turn) -> Vec3:
+def sample(u: Vec2, wi: Vec3, A: Mat3, *, turn: Turn | None = None) -> Vec3:
     """As `ellipsoid_cap.sample` with the cap's lower end at `bound`: only for single reflection.
 
     - `u`: in [0, 1)², (2,). `wi`: unit, (3,), anywhere but where A ω_i points straight below.
-    - `turn`: the form of cos 2πu and sin 2πu.
+    - `turn`: a form of cos 2πu and sin 2πu, in one word; else in two.
     - `A`: shape matrix, (3, 3), non-singular. Returns a micronormal with density `pdf`: unit, (3,), above the horizon.
     """
     terms = canonical_terms(A)
-    return from_sphere(*half_vector(u, wi, terms, _cut(wi, terms), turn), terms)
+    return from_sphere(half_vector(u, wi, terms, _cut(wi, terms), turn), terms)
 
 
 @stable.widened
@@ -79,7 +86,7 @@ def pdf(wm: Vec3, wi: Vec3, A: Mat3) -> Scalar:
     A, _ = near_one(A)
     terms = canonical_terms(A)
     one = jnp.ones_like(wi[2])
-    rise = area_ggx(to_sphere(wi, terms), (one, one), 1)
+    rise = area_ggx(_rounded_to_sphere(wi, terms), (one, one), 1)
     cosine, cut = stable.cosine(wi, wm), _cut(wi, terms)
     slack = 1 - 64 * float(jnp.finfo(wm.dtype).eps)
     # A is canonical up to a rotation and the factor ‖A n‖.

@@ -1,44 +1,18 @@
 """Visible normals of the ellipsoid NDF through the silhouette of a lune: walter2014 §4, versions 1 to 3."""
 
-import functools
-
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from ggxref import _pairs, _special, stable
+from ggxref import _special, stable
 from ggxref._types import Mat3, Scalar, Vec2, Vec3
-from ggxref.ellipsoid import Canonical, Frame, canonical_frame, cofactor, length, near_one, reciprocal_scale, times
+from ggxref.ellipsoid import canonical_frame, cofactor, length, near_one, times
 from ggxref.geometry import basis
-from ggxref.sampling._lune import one_pass, point
+from ggxref.sampling._ellipsoid import image, risen, shortened, to_sphere
+from ggxref.sampling._lune import point
 from ggxref.sampling._visible import pdf_ellipsoid as pdf
 
 __all__ = ["pdf", "sample", "sample_rejection_ellipsoid", "sample_rejection_sphere"]
-
-
-def _image(column: tuple[Scalar, ...], p: tuple[_pairs.Pair, ...]) -> Scalar:
-    value, rest = _pairs.dot(column, tuple(hi for hi, _ in p))
-    return value + (rest + sum(c * low for c, (_, low) in zip(column, p, strict=True)))
-
-
-def to_sphere(wi: Vec3, frame: Frame) -> tuple[_pairs.Pair, ...]:
-    """`A wi` for a canonical `A`, its largest component near 1."""
-    c00, c10, c11, ex, ey = frame.terms
-    x, y, z = wi
-    across, rest = _pairs.dot((c11,), (y,))
-    across = stable.plus_zero_times(across, frame.lower, x), rest
-    i = _pairs.dot((c00, c10), (x, y)), across, _pairs.dot((ex, ey, jnp.ones_like(z)), (x, y, z))
-    scale = reciprocal_scale(functools.reduce(jnp.maximum, (jnp.abs(c) for c, _ in i)))
-    return tuple(_pairs.scaled(c, scale) for c in i)
-
-
-def _rising(p: _pairs.Pairs, A: Canonical) -> _pairs.Pairs:
-    """The point, as if its height were constant where most of the normal is that height times (ex, ey, 1)."""
-    (x, x_rest), (y, y_rest), (z, z_rest) = p
-    c00, c10, c11, ex, ey = A
-    across = (c00 + jnp.abs(c10) + c11) * (jnp.abs(x) + jnp.abs(y))
-    x, y, z = stable.rising(jnp.abs(z) * (1 + jnp.abs(ex) + jnp.abs(ey)) > across, x, y, z)
-    return (x, x_rest), (y, y_rest), (z, z_rest)
 
 
 @stable.widened
@@ -52,11 +26,11 @@ def sample(u: Vec2, wi: Vec3, A: Mat3) -> Vec3:
     walter2014 (34)–(46), version 3. Where ω_i = n, (43) leaves e₂ free: it is the second row of `geometry.basis(e3)`.
     """
     frame = canonical_frame(A)
-    x, y, z = point(u, one_pass(*to_sphere(wi, frame)), frame.side, frame.pole)
-    c00, c10, c11, ex, ey = frame.terms
-    x, y, z = _rising((x, y, z), frame.terms)
-    along = stable.plus_zero_times(_image((c00, ex), (x, z)), frame.lower, y[0])
-    return stable.direction(along, _image((c10, c11, ey), (x, y, z)), _pairs.rounded(z))
+    x, (y, y_rest), z = to_sphere(wi, frame.terms)
+    i, _ = shortened((x, (stable.plus_zero_times(y, frame.lower, wi[0]), y_rest), z))
+    p = risen(point(u, i, frame.side, frame.pole), frame.terms)
+    x, y, z = image(p, frame.terms)
+    return stable.direction(stable.plus_zero_times(x, frame.lower, p[1][0]), y, z)
 
 
 Tries = Float[Array, "n 2"]

@@ -1,0 +1,61 @@
+"""Between directions and the unit sphere that the ellipsoid in canonical form is an image of, in two words: a skewed or
+anisotropic ellipsoid makes many of each rounding.
+"""
+
+import functools
+
+import jax.numpy as jnp
+
+from ggxref import _pairs, stable
+from ggxref._pairs import Pair, Pairs, Triple
+from ggxref._types import Scalar, Vec3
+from ggxref.ellipsoid import Canonical, reciprocal_scale
+
+
+def to_sphere(wi: Vec3, A: Canonical) -> Pairs:
+    """`A wi`: along the sphere-space direction. Its sums cancel as soon as `A` is skewed."""
+    c00, c10, c11, ex, ey = A
+    x, y, z = wi
+    return _pairs.dot((c00, c10), (x, y)), _pairs.dot((c11,), (y,)), _pairs.dot((ex, ey, jnp.ones_like(z)), (x, y, z))
+
+
+def shortened(i: Pairs) -> tuple[Pairs, Scalar]:
+    """`i`, which is as long as α, times a power of two that brings its largest component near 1; and that factor."""
+    scale = reciprocal_scale(functools.reduce(jnp.maximum, (jnp.abs(c) for c, _ in i)))
+    x, y, z = _pairs.one_pass(*(_pairs.scaled(c, scale) for c in i))
+    return (x, y, z), scale
+
+
+def poles(square: Pair, z: Pair) -> tuple[Pair, Pair, Pair]:
+    """Of a vector of length N, N² and, without cancellation, N + z and N - z. `square`: N² - z²."""
+    norm_square = _pairs.total(square, _pairs.product(z, z))
+    below = z[0] < 0
+    large = _pairs.total(_pairs.square_root(norm_square), _pairs.choice(below, _pairs.minus(z), z))
+    small = _pairs.ratio(square, large)
+    return norm_square, _pairs.choice(below, small, large), _pairs.choice(below, large, small)
+
+
+def risen(p: Pairs, A: Canonical) -> Pairs:
+    """The point, as if its height were constant where most of the normal is that height times (ex, ey, 1)."""
+    (x, x_rest), (y, y_rest), (z, z_rest) = p
+    c00, c10, c11, ex, ey = A
+    across = (c00 + jnp.abs(c10) + c11) * (jnp.abs(x) + jnp.abs(y))
+    x, y, z = stable.rising(jnp.abs(z) * (1 + jnp.abs(ex) + jnp.abs(ey)) > across, x, y, z)
+    return (x, x_rest), (y, y_rest), (z, z_rest)
+
+
+def image(p: Pairs, A: Canonical) -> Triple:
+    """`Aᵀ p`. Its height has the sign of p's, exactly."""
+    c00, c10, c11, ex, ey = A
+    x, _, z = p
+    return _component((c00, ex), (x, z)), _component((c10, c11, ey), p), _pairs.rounded(z)
+
+
+def _component(column: tuple[Scalar, ...], p: tuple[Pair, ...]) -> Scalar:
+    value, rest = _pairs.dot(column, tuple(hi for hi, _ in p))
+    return value + (rest + sum(c * low for c, (_, low) in zip(column, p, strict=True)))
+
+
+def from_sphere(p: Pairs, A: Canonical) -> Vec3:
+    """The micronormal along `Aᵀ p`: unit, (3,)."""
+    return stable.direction(*image(risen(p, A), A))
