@@ -9,20 +9,16 @@ import math
 import jax.numpy as jnp
 from jax import lax
 
-from ggxref import _pairs, _special, _squares, stable
+from ggxref import _squares, stable
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import inverse_square, near_one
-from ggxref.slopes import student
+from ggxref.slopes import gaussian, student
 
 
 def hemisphere(wm: Vec3) -> Scalar:
     r"""$D = \chi^+(\omega_m\cdot n)/\pi$: GGX at α = 1. dupuy2023 (3)."""
     z = wm[2]
     return jnp.where(z > 0, 1 / math.pi, jnp.where(z <= 0, 0, z)).astype(wm.dtype)
-
-
-def _stretched(wm, alpha):
-    return (wm[0] / alpha[0]) ** 2 + (wm[1] / alpha[1]) ** 2
 
 
 @stable.widened
@@ -51,20 +47,9 @@ def beckmann_times(wm: Vec3, alpha: Vec2, factor: Real) -> Scalar:
 
     - `wm`: unit, (3,). `alpha`: positive, (2,). `factor`: a number.
     """
-    rho, z_square = _stretched(wm, alpha), wm[2] ** 2
-    # Beyond this exponent D is 0 in the dtype; towards the horizon z⁴ then is 0 too, and D or its gradient 0/0.
-    seen = ~((wm[2] <= 0) | (rho >= -2 * math.log(float(jnp.finfo(wm.dtype).tiny)) * z_square))
-    z_square = jnp.where(seen, z_square, 1)
-    x, y, z = (jnp.where(seen, c, d) for c, d in zip(wm, (0.0, 0.0, 1.0), strict=True))
-    exponent, rest = _pairs.tangent_square(x, y, z, alpha[0], alpha[1])
-    m, m_rest, k = _special.exp_minus(exponent, rest)
-    # What the length of `wm` is beyond 1 counts four times; it changes the value, not the derivative.
-    m = m + (m_rest + 4 * m * lax.stop_gradient(stable.excess((x, y, z))))
-    # The power of two in halves: the peak 1/(π αx αy) reaches into tails where the exponential alone has underflowed.
-    half = jnp.floor(k / 2)
-    top = m * _special.power_of_two(-half) * factor
-    D = top / (math.pi * alpha[0] * z_square * (alpha[1] * z_square)) * _special.power_of_two(half - k)
-    return jnp.where(seen, D, 0)
+    below = wm[2] <= 0
+    value = gaussian(wm[0], wm[1], jnp.where(below, 1, wm[2]), alpha, factor, stable.excess(wm))
+    return jnp.where(below, 0, value)
 
 
 @stable.widened

@@ -9,12 +9,13 @@ import math
 
 import jax
 import jax.numpy as jnp
+from jax import lax
 
 from ggxref import _pairs, _special, _squares, stable
-from ggxref._errorfree import two_product
+from ggxref._errorfree import two_product, two_sum
 from ggxref._seen import area_ggx, over_beckmann, over_ggx
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
-from ggxref.ellipsoid import canonical, reciprocal_scale
+from ggxref.ellipsoid import canonical_terms, reciprocal_scale
 
 
 @stable.widened
@@ -42,45 +43,72 @@ def stretch(w: Vec3, factors: Vec2) -> Vec3:
     return jnp.stack(stable.unit(factors[0] * w[0], factors[1] * w[1], w[2]))
 
 
-def _stretched_square(slope, alpha):
-    return (slope[0] / alpha[0]) ** 2 + (slope[1] / alpha[1]) ** 2
-
-
 @stable.widened
 def ggx(slope: Vec2, alpha: Vec2) -> Scalar:
     r"""$P^{22} = 1 / (\pi\alpha_x\alpha_y (1 + \tilde x^2/\alpha_x^2 + \tilde y^2/\alpha_y^2)^2)$. heitz2014 §5."""
     zero = jnp.zeros_like(slope[0])
-    return _bell(slope[0], slope[1], alpha[0], alpha[1], zero, zero + 1)
+    return _bell((slope[0], zero), (slope[1], zero), alpha[0], alpha[1], zero, zero + 1)
 
 
 @jax.custom_jvp
 def _bell(x, y, a, b, c, factor):
-    r"""$f/(\pi a b (1 + u^2 + v^2)^2)$ with $u = x/a$, $v = (y - c u)/b$. Its derivatives do not underflow before it does."""
-    u = x / a
-    v = (y - c * u) / b
-    return factor * _squares.lobe(a, b, 1 + u * u + v * v)
+    r"""$f/(\pi a b (1 + u^2 + v^2)^2)$ with $u = x/a$, $v = (y - c u)/b$, `x` and `y` sums of two. Its derivatives do not underflow
+    before it does."""
+    zero, one = jnp.zeros_like(a), jnp.ones_like(a)
+    u = _pairs.ratio(two_sum(*x), (a, zero))
+    v = _pairs.ratio(_pairs.less(two_sum(*y), _pairs.product((c, zero), u)), (b, zero))
+    q = _pairs.rounded(_pairs.square_of_pairs((one, zero), u, v))
+    _, _, plain = _bell_parts(x, y, a, b, c)
+    return factor * _squares.lobe(a, b, jnp.where(plain < 1e37, q, plain))  # beyond, the second words are not there
+
+
+def _bell_parts(x, y, a, b, c):
+    """u, v and 1 + u² + v²."""
+    u = (x[0] + x[1]) / a
+    v = ((y[0] + y[1]) - c * u) / b
+    return u, v, 1 + u * u + v * v
 
 
 @_bell.defjvp
 def _bell_jvp(primals, tangents):
     (x, y, a, b, c, factor), (dx, dy, da, db, dc, dfactor) = primals, tangents
-    u = x / a
-    v = (y - c * u) / b
-    value, q = _bell(*primals), 1 + u * u + v * v
+    (u, v, q), value = _bell_parts(x, y, a, b, c), _bell(*primals)
     by_v = 4 * v / q
     by_u = 4 * u / q - by_v * (c / b)
     # Quotients by a and b first: the value times a small factor may underflow.
-    across = (value * ((by_v * v - 1) / b)) * db - (value * (by_v / b)) * dy + (value * (by_v / b * u)) * dc
-    along = (value * ((by_u * u - 1) / a)) * da - (value * (by_u / a)) * dx
+    across = (value * ((by_v * v - 1) / b)) * db - (value * (by_v / b)) * sum(dy) + (value * (by_v / b * u)) * dc
+    along = (value * ((by_u * u - 1) / a)) * da - (value * (by_u / a)) * sum(dx)
     return value, across + along + _bell(x, y, a, b, c, jnp.ones_like(factor)) * dfactor
 
 
 @stable.widened
 def beckmann(slope: Vec2, alpha: Vec2) -> Scalar:
     r"""$P^{22} = \exp(-\tilde x^2/\alpha_x^2 - \tilde y^2/\alpha_y^2) / (\pi\alpha_x\alpha_y)$. heitz2014 §5."""
-    # Half the exponent twice: the peak 1/(π αx αy) reaches into tails where the exponential alone has underflowed.
-    half = jnp.exp(-_stretched_square(slope, alpha) / 2)
-    return half * (half / (math.pi * alpha[0] * alpha[1]))
+    return _beckmann_times(slope, alpha, 1.0)
+
+
+def _beckmann_times(slope, alpha, factor):
+    return gaussian(slope[0], slope[1], jnp.ones_like(slope[0]), alpha, factor, 0.0)
+
+
+def gaussian(x: Scalar, y: Scalar, z: Scalar, alpha: Vec2, factor: Real, longer: Real) -> Scalar:
+    r"""$\exp(-\rho/z^2) / (\pi\alpha_x\alpha_y z^4)$, $\rho = x^2/\alpha_x^2 + y^2/\alpha_y^2$, `z > 0`, times a factor, by which its tails may be
+    within the dtype's range where it itself is not.
+
+    - `longer`: by how much the length of (x, y, z) exceeds 1, which counts four times; a constant to the derivative.
+    """
+    rho = (x / alpha[0]) ** 2 + (y / alpha[1]) ** 2
+    # Beyond this exponent it is 0 in the dtype; towards the horizon z⁴ then is 0 too, and it or its gradient 0/0.
+    seen = ~(rho >= -2 * math.log(float(jnp.finfo(z.dtype).tiny)) * z**2)
+    x, y, z = (jnp.where(seen, c, d) for c, d in ((x, 0), (y, 0), (z, 1)))
+    exponent, rest = _pairs.tangent_square(x, y, z, alpha[0], alpha[1])
+    m, m_rest, k = _special.exp_minus(exponent, rest)
+    m = m + (m_rest + 4 * m * lax.stop_gradient(longer))
+    # The power of two in halves: the peak 1/(π αx αy) reaches into tails where the exponential alone has underflowed.
+    half = jnp.floor(k / 2)
+    top, z_square = m * _special.power_of_two(-half) * factor, z**2
+    value = top / (math.pi * alpha[0] * z_square * (alpha[1] * z_square)) * _special.power_of_two(half - k)
+    return jnp.where(seen, value, 0)
 
 
 @stable.widened
@@ -172,8 +200,8 @@ def ellipsoid(slope: Vec2, A: Mat3) -> Scalar:
 
     The bivariate Student-t density with 2 degrees of freedom, location $-e$ and shape Σ/2 (design: canonical form).
     """
-    (c00, c10, _), (_, c11, _), (ex, ey, _) = canonical(A)
-    return _bell(slope[0] + ex, slope[1] + ey, c00, c11, c10, jnp.ones_like(ex))
+    c00, c10, c11, ex, ey = canonical_terms(A)
+    return _bell((slope[0], ex), (slope[1], ey), c00, c11, c10, jnp.ones_like(ex))
 
 
 @stable.widened
@@ -237,7 +265,7 @@ def sigma_beckmann(w: Vec3, alpha: Vec2) -> Scalar:
 def _factor(slope, wi):
     """The normal of that slope, not unit, and its cosine; heitz2014 (7) with the signs of its appendix A, as (7) has them wrong."""
     m = -slope[0], -slope[1], jnp.ones_like(slope[0])
-    return m, stable.dot(wi, jnp.stack(m))
+    return m, stable.cosine(wi, jnp.stack(m))
 
 
 @stable.widened
@@ -250,8 +278,8 @@ def visible_ggx(slope: Vec2, wi: Vec3, alpha: Vec2) -> Scalar:
     """
     m, factor = _factor(slope, wi)
     share = 2 * over_ggx(tuple(wi), m, tuple(alpha), 1.0, factor)
-    x, y = slope
-    return _bell(x, y, alpha[0], alpha[1], jnp.zeros_like(x), jnp.where(factor <= 0, 0, share))
+    zero = jnp.zeros_like(factor)
+    return _bell((slope[0], zero), (slope[1], zero), alpha[0], alpha[1], zero, jnp.where(factor <= 0, 0, share))
 
 
 @stable.widened
@@ -259,4 +287,4 @@ def visible_beckmann(slope: Vec2, wi: Vec3, alpha: Vec2) -> Scalar:
     """`visible_ggx` for Beckmann slopes. heitz2014 (7)."""
     m, factor = _factor(slope, wi)
     share = over_beckmann(tuple(wi), m, tuple(alpha), sigma_beckmann(wi, alpha), factor)
-    return jnp.where(factor <= 0, 0, share) * beckmann(slope, alpha)
+    return _beckmann_times(slope, alpha, jnp.where(factor <= 0, 0, share))
