@@ -182,6 +182,17 @@ def square_root(a: Pair) -> Pair:
     return root(a, stable.rsqrt(a[0]))
 
 
+def or_one(condition: Bool[Array, ""], a: Pair) -> Pair:
+    """A divisor, near 1 where there is none."""
+    return jnp.where(condition, a[0], 1), a[1]
+
+
+def sum_by_squares(a: Pair, b: Pair, squares: Pair) -> Pair:
+    """`a + b`, where it would cancel as the quotient of `squares`, which is a² − b², by `a - b`."""
+    differ = ((a[0] > 0) & (b[0] < 0)) | ((a[0] < 0) & (b[0] > 0))
+    return choice(differ, ratio(squares, or_one(differ, less(a, b))), total(a, b))
+
+
 def one_pass(*pairs: Pair) -> tuple[Pair, ...]:
     """`stable.one_loop` of pairs. XLA does not vectorise a whole sampler in two words as one loop, nor one of 16 results."""
     flat = stable.one_loop(*(word for pair in pairs for word in pair))

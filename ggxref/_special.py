@@ -9,7 +9,7 @@ import numpy as np
 from jax import lax
 
 from ggxref._errorfree import fast_two_sum, two_product, two_sum
-from ggxref._pairs import Pair
+from ggxref._pairs import Pair, choice
 from ggxref._types import Real, Scalar
 from ggxref.stable import crude_quotient, reciprocal
 
@@ -357,31 +357,36 @@ def _odd(series, x, rest, t):
 
 
 def _cos_sin(angle, rest):
-    """Cosine and sine of an angle of two words in [0, 0.9]: what is not exact is small."""
+    """Cosine and sine of an angle in [0, 0.9], each of two words: what is not exact is small."""
     wide = angle.dtype == jnp.float64
     square, square_rest = two_product(angle, angle)
     high = 1 - square / 2
     lost = (1 - high) - square / 2
-    s = angle + (rest * high + angle * (square * _horner(_SINE[: 9 if wide else 5], square)))
-    c = high + (lost + (square * square * _horner(_COSINE[: 9 if wide else 5], square) - (square_rest / 2 + s * rest)))
-    return c, s
+    s = fast_two_sum(angle, rest * high + angle * (square * _horner(_SINE[: 9 if wide else 5], square)))
+    beyond = square * square * _horner(_COSINE[: 9 if wide else 5], square) - (square_rest / 2 + s[0] * rest)
+    return fast_two_sum(high, lost + beyond), s
 
 
 @jax.custom_jvp
 def kepler(v: Real) -> tuple[Scalar, Scalar]:
+    """`kepler_pairs`, rounded; with a derivative."""
+    (c, c_rest), (s, s_rest) = kepler_pairs(jnp.asarray(v))
+    return c + c_rest, s + s_rest
+
+
+def kepler_pairs(v: Scalar) -> tuple[Pair, Pair]:
     r"""$(\cos\frac E2, \sin\frac E2)$ for the root E in [0, π] of $E - \sin E = 2\pi v$, `v` in [0, 1/2]: Kepler's equation at
     eccentricity 1.
 
     E/2 is the angle that cuts the fraction `v` of a disk's area, so this inverts the marginal of a uniform disk. E is an odd
     function of the cube root of `v`, π − E one of 1/2 − v; the cosine takes its digits from the latter.
     """
-    v = jnp.asarray(v)
     upper = v > 0.125
     (w, w_rest), d = _cbrt(jnp.where(upper, 0, v)), 0.5 - v
     near = _odd(_NEAR[v.dtype], w, w_rest, 8 * w * w - 1)
     far = _odd(_FAR[v.dtype], d, (0.5 - d) - v, (128 / 9) * d * d - 1)
     c, s = _cos_sin(*(jnp.where(upper, y, x) for x, y in zip(near, far, strict=True)))
-    return jnp.where(upper, s, c), jnp.where(upper, c, s)
+    return choice(upper, s, c), choice(upper, c, s)
 
 
 @kepler.defjvp

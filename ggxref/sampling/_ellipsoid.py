@@ -11,6 +11,8 @@ from ggxref._pairs import Pair, Pairs, Triple
 from ggxref._types import Scalar, Vec3
 from ggxref.ellipsoid import Canonical, reciprocal_scale
 
+Two = tuple[Scalar, Scalar]
+
 
 def to_sphere(wi: Vec3, A: Canonical) -> Pairs:
     """`A wi`: along the sphere-space direction. Its sums cancel as soon as `A` is skewed."""
@@ -33,6 +35,21 @@ def poles(square: Pair, z: Pair) -> tuple[Pair, Pair, Pair]:
     large = _pairs.total(_pairs.square_root(norm_square), _pairs.choice(below, _pairs.minus(z), z))
     small = _pairs.ratio(square, large)
     return norm_square, _pairs.choice(below, small, large), _pairs.choice(below, large, small)
+
+
+def ray(i: Pairs, pole: Two) -> tuple[Pair, ...]:
+    """Of `i`, of length N: its azimuth times S; then S, N sin θ, N², N + z and N − z. `pole`: the azimuth where it has none."""
+    x, y, z = i
+    scale = reciprocal_scale(jnp.maximum(jnp.abs(x[0]), jnp.abs(y[0])))
+    none, zero = (x[0] == 0) & (y[0] == 0), jnp.zeros_like(x[0])
+    X, Y = (
+        _pairs.choice(none, (pole[0], zero), _pairs.scaled(x, scale)),
+        _pairs.choice(none, (pole[1], zero), _pairs.scaled(y, scale)),
+    )
+    S = _pairs.square_root(_pairs.square_of_pairs(X, Y))
+    flat = _pairs.scaled(S, jnp.where(none, 0, reciprocal_scale(scale)))
+    norm_square, rise, fall = poles(_pairs.product(flat, flat), z)
+    return X, Y, S, flat, norm_square, rise, fall
 
 
 def risen(p: Pairs, A: Canonical) -> Pairs:

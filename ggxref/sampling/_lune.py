@@ -6,8 +6,7 @@ In the frame of the pole: its coordinates are those of a canonical matrix, so th
 
 import jax
 import jax.numpy as jnp
-from jax import Array, lax
-from jaxtyping import Bool
+from jax import lax
 
 from ggxref import _special, stable
 from ggxref._errorfree import two_sum
@@ -18,24 +17,18 @@ from ggxref._pairs import (
     less,
     minus,
     one_pass,
+    or_one,
     product,
     ratio,
     scaled,
-    square_of_pairs,
     square_root,
+    sum_by_squares,
     total,
 )
 from ggxref._types import Scalar, Vec2
-from ggxref.ellipsoid import length, reciprocal_scale
-from ggxref.sampling._ellipsoid import poles
+from ggxref.ellipsoid import length
+from ggxref.sampling._ellipsoid import Two, ray
 from ggxref.sampling._sphere import crescent, incident
-
-Two = tuple[Scalar, Scalar]
-
-
-def _or_one(condition: Bool[Array, ""], a: Pair) -> Pair:
-    """A divisor, near 1 where there is none."""
-    return jnp.where(condition, a[0], 1), a[1]
 
 
 def _square(u):
@@ -49,21 +42,9 @@ def _square(u):
 def _concentric(u: Vec2) -> Pairs:
     """Point of the unit disk and its `1 - r²`: walter2014 (34)–(37) (Shirley & Chiu 1997)."""
     wide, r, other, edge = _square(u)
-    c, s = _special.cos_sin_eighth(ratio(other, _or_one(r[0] != 0, scaled(r, 8))))
+    c, s = _special.cos_sin_eighth(ratio(other, or_one(r[0] != 0, scaled(r, 8))))
     rim = product((edge, jnp.zeros_like(edge)), two_sum(jnp.full_like(edge, 2), -edge))
     return product(r, choice(wide, c, s)), product(r, choice(wide, s, c)), rim
-
-
-def _ray(i: Pairs, pole: Two) -> tuple[Pair, ...]:
-    """Of `i`, of length N: its azimuth times S; then S, N sin θ, N², N + z and N − z. `pole`: the azimuth where it has none."""
-    x, y, z = i
-    scale = reciprocal_scale(jnp.maximum(jnp.abs(x[0]), jnp.abs(y[0])))
-    none, zero = (x[0] == 0) & (y[0] == 0), jnp.zeros_like(x[0])
-    X, Y = choice(none, (pole[0], zero), scaled(x, scale)), choice(none, (pole[1], zero), scaled(y, scale))
-    S = square_root(square_of_pairs(X, Y))
-    flat = scaled(S, jnp.where(none, 0, reciprocal_scale(scale)))
-    norm_square, rise, fall = poles(product(flat, flat), z)
-    return X, Y, S, flat, norm_square, rise, fall
 
 
 def _chord(along: Pair, rim: Pair) -> Pairs:
@@ -71,7 +52,7 @@ def _chord(along: Pair, rim: Pair) -> Pairs:
     half = square_root(total(rim, product(along, along)))
     up = along[0] > 0
     far = total(half, choice(up, along, minus(along)))
-    near = ratio(rim, _or_one(far[0] > 0, far))
+    near = ratio(rim, or_one(far[0] > 0, far))
     return half, choice(up, near, far), choice(up, far, near)
 
 
@@ -85,10 +66,7 @@ def _compressed(half: Pair, below_rim: Pair, above_rim: Pair, z: Pair, rise: Pai
 
 def _turned(moved: Pair, lifted: Pair, numerator: Pair, z: Pair, flat: Pair, norm_square: Pair) -> tuple[Pair, Pair]:
     """The point away from the pole, towards `i`, and its height, both times N²."""
-    plus, minus = product(lifted, z), product(moved, flat)
-    differ = ((plus[0] > 0) & (minus[0] < 0)) | ((plus[0] < 0) & (minus[0] > 0))  # a sum would cancel
-    quotient = ratio(numerator, _or_one(differ, less(plus, minus)))
-    height = choice(differ, product(quotient, norm_square), total(plus, minus))
+    height = sum_by_squares(product(lifted, z), product(moved, flat), product(numerator, norm_square))
     return less(product(flat, lifted), product(z, moved)), height
 
 
@@ -99,7 +77,7 @@ def point(u: Vec2, i: Pairs, side: Scalar, pole: Two) -> Pairs:
     - `i`: along A ω_i for a canonical `A`, its largest component near 1.
     """
     z = i[2]
-    X, Y, S, flat, norm_square, rise, fall = one_pass(*_ray(i, pole))
+    X, Y, S, flat, norm_square, rise, fall = one_pass(*ray(i, pole))
     along, across, rim = _concentric(u)
     along, across, rim = one_pass(along, scaled(across, side), rim)
     half, below_rim, above_rim = one_pass(*_chord(along, rim))

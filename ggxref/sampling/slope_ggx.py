@@ -5,8 +5,11 @@ import jax.numpy as jnp
 from jax import lax
 
 from ggxref import _special, stable
+from ggxref._errorfree import two_product, two_sum
+from ggxref._pairs import choice, less, minus, one_pass, product, rounded, scaled, square_root, sum_by_squares, total
 from ggxref._types import Vec2, Vec3
-from ggxref.ellipsoid import reciprocal_scale
+from ggxref.ellipsoid import length, reciprocal_scale
+from ggxref.sampling._ellipsoid import ray, shortened
 from ggxref.sampling._sphere import unstretch
 from ggxref.sampling._visible import pdf_ggx as pdf
 
@@ -27,9 +30,51 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
 
     heitz2014 (10)–(13), algorithm 4 (whose authors' code fitted the second inverse, walter2014 §4.2).
     """
-    x, y, z = stable.turning(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
-    scale = reciprocal_scale(jnp.abs(x) + jnp.abs(y) + jnp.abs(z))
-    x, y, z = x * scale, y * scale, z * scale
+    i = two_product(alpha[0], wi[0]), two_product(alpha[1], wi[1]), (wi[2], jnp.zeros_like(wi[2]))
+    x, y, z = map(rounded, _point(u, shortened(i)[0]))
+    return unstretch(x, y, z, alpha)
+
+
+@jax.custom_jvp
+def _point(u, i):
+    """`_plain_point` in two words: for an anisotropic surface the turn to the azimuth of ω_i cancels.
+
+    - `i`: along the stretched ω_i, near 1.
+    """
+    one, zero = jnp.ones_like(u[0]), jnp.zeros_like(u[0])
+    X, Y, S, flat, norm_square, rise, fall = one_pass(*ray(i, (one, zero)))
+    sin_psi, cos_psi = one_pass(*_along_in_two_words(u[0], flat, i[2], norm_square, rise, fall))
+    upper = u[1] > 0.5
+    c, s = one_pass(*_special.kepler_pairs(jnp.where(upper, 1 - u[1], u[1])))
+    along, across = product(sin_psi, s), product(norm_square, choice(upper, minus(c), c))
+    x, y = total(product(X, along), product(Y, across)), less(product(X, across), product(Y, along))
+    return minus(x), y, product(S, product(cos_psi, s))
+
+
+def _along_in_two_words(u, flat, z, norm_square, rise, fall):
+    """The first two of `_along`."""
+    lower = product((u, jnp.zeros_like(u)), rise)
+    cosine = square_root(product(product(two_sum(jnp.ones_like(u), -u), rise), total(fall, lower)))
+    cosine, sine, lower = one_pass(cosine, less(lower, z), lower)
+    squares = product(norm_square, product(lower, less(scaled(z, 2), lower)))
+    cos_psi = sum_by_squares(product(cosine, z), product(sine, flat), squares)
+    return less(product(sine, z), product(cosine, flat)), cos_psi
+
+
+@_point.defjvp
+def _point_jvp(primals, tangents):
+    """A direction does not depend on the length of what it is made of, which is taken as constant."""
+    (u, i), (du, di) = primals, tangents
+    values = _point(u, i)
+    plain, change = jax.jvp(_plain_point, (u, *(hi for hi, _ in i)), (du, *(d for d, _ in di)))
+    share = lax.stop_gradient(length(*(hi for hi, _ in values)) / length(*plain))
+    x, y, z = ((share * d, jnp.zeros_like(d)) for d in change)
+    return values, (x, y, z)
+
+
+def _plain_point(u, x, y, z):
+    """The sphere-space normal, of any length."""
+    x, y, z = stable.turning(x, y, z)
     square = x * x + y * y
     flat = stable.sqrt(square)
     sin_psi, cos_psi, length = _along(u[0], flat, z, square)
@@ -38,7 +83,7 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
     c, s = stable.one_loop(*_special.kepler(jnp.where(upper, 1 - u[1], u[1])))
     along, across = -sin_psi * s, length * jnp.where(upper, -c, c)
     cos_i, sin_i, one = _azimuth(x, y, flat)
-    return unstretch(cos_i * along - sin_i * across, sin_i * along + cos_i * across, one * (cos_psi * s), alpha)
+    return cos_i * along - sin_i * across, sin_i * along + cos_i * across, one * (cos_psi * s)
 
 
 def _azimuth(x, y, flat):
