@@ -57,6 +57,23 @@ def _stretched_square_jvp(primals, tangents):
 
 
 @jax.custom_jvp
+def refracted_square(c: Scalar, rest: Scalar, eta: Scalar) -> Scalar:
+    """The squared cosine behind a boundary, 1 − η²(1 − (c + rest)²), rounded once: towards the critical angle it cancels.
+
+    A rest has no derivative of its own.
+    """
+    product, lost = two_product(eta, c)
+    total, errors = collected([(jnp.ones_like(product), 0), two_product(-eta, eta), two_product(product, product)])
+    return total + (sum(errors) + 2 * product * (lost + eta * rest))
+
+
+@refracted_square.defjvp
+def _refracted_square_jvp(primals, tangents):
+    (c, _, eta), (dc, _, deta) = primals, tangents
+    return refracted_square(*primals), 2 * eta * (eta * c * dc - (1 - c) * (1 + c) * deta)
+
+
+@jax.custom_jvp
 def lobe(a: Scalar, b: Scalar, q: Scalar) -> Scalar:
     r"""$1/(\pi a b q^2)$, the shape of every GGX: each product within the range, and in the derivative each quotient."""
     return 1 / (math.pi * (a * q) * (b * q))

@@ -10,8 +10,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from ggxref import stable
-from ggxref._errorfree import collected, two_product
+from ggxref import _squares, stable
 from ggxref._types import Real, Scalar
 from ggxref.ellipsoid import reciprocal_scale
 
@@ -37,7 +36,7 @@ def _dielectric(cosine, eta):
 def _amplitudes(c, eta):
     """c_t, the denominators of R_s and R_p, whether light is split at all, R_s and R_p."""
     gap = (1 - eta) * (1 + eta)  # 1 - eta², exact also near eta = 1
-    square = _cosine_square(c, eta)
+    square = _squares.refracted_square(c, jnp.zeros_like(c), eta)
     ct = stable.sqrt(square)
     # Both numerators times their conjugates: ηc − c_t and c − ηc_t cancel as η → 1, these do not.
     s_sum, p_sum = eta * c + ct, c + eta * ct
@@ -46,20 +45,6 @@ def _amplitudes(c, eta):
     r_s = -gap / s_sum**2
     r_p = gap * (c * c - eta**2 * (1 - c) * (1 + c)) / p_sum**2
     return jnp.where(fine, ct, 1), s_sum, p_sum, fine, r_s, r_p
-
-
-@jax.custom_jvp
-def _cosine_square(c, eta):
-    """1 − η²(1 − c²), rounded once: towards the critical angle it cancels, and F goes with its root."""
-    product, lost = two_product(eta, c)
-    total, errors = collected([(jnp.ones_like(product), 0), two_product(-eta, eta), two_product(product, product)])
-    return total + (sum(errors) + 2 * product * lost)
-
-
-@_cosine_square.defjvp
-def _cosine_square_jvp(primals, tangents):
-    (c, eta), (dc, deta) = primals, tangents
-    return _cosine_square(c, eta), 2 * eta * (eta * c * dc - (1 - c) * (1 + c) * deta)
 
 
 @_dielectric.defjvp

@@ -2,8 +2,9 @@
 
 import jax
 import jax.numpy as jnp
+from jax import lax
 
-from ggxref import stable
+from ggxref import _pairs, _squares, stable
 from ggxref._types import Mat3, Real, Vec3
 
 
@@ -30,9 +31,9 @@ def refract(w: Vec3, wm: Vec3, eta: Real) -> Vec3:
     heitz2014 §2.2, which prints n for n² under the root and takes the sign of ω·n; sgn(c) is the same for the microfacets
     that `w` can see, and right for every other.
     """
-    c = stable.dot(w, wm)
-    # (1 - eta)(1 + eta) + (eta c)^2 is the printed radicand without its cancellation at eta = 1.
-    square = (1 - eta) * (1 + eta) + (eta * c) ** 2
+    c, (value, rest) = stable.cosine(w, wm), _pairs.dot(tuple(w), tuple(wm))
+    rest = lax.stop_gradient((value - c) + (rest - c * (stable.excess(w) + stable.excess(wm))))
+    square = _squares.refracted_square(c, rest, jnp.asarray(eta, c.dtype))
     root = stable.sqrt(square)
     along = jnp.where(c > 0, eta * c - root, eta * c + root)
     x, y, z = (jnp.where(square < 0, 0, along * m - eta * x) for x, m in zip(w, wm, strict=True))

@@ -77,14 +77,13 @@ def blocks(names: tuple[str, ...], args) -> dict[str, slice]:
 def points(region: str, rng: np.random.Generator, n: int) -> Points:
     """Those of the region and, made from them, what functions without a reference take."""
     p = REGIONS[region](rng, n)
-    A, z = p["A"], np.where(p["wm"][2] > 0, p["wm"][2], 1)
+    A = p["A"]
     shares = np.stack([p["u"][0], p["u"][1], p["x"], p["g1_i"], p["g1_o"], p["f0"]])
     (a, b), (_, d) = A[0, :2], A[1, :2]
     scatter = np.stack([a * a, a * b, a * b, b * b + d * d]).reshape(2, 2, -1)
     return p | {
         "u3": shares[:3],
         "rows": shares.reshape(3, 2, -1),
-        "slope": -p["wm"][:2] / z,
         "factors": p["alpha"],
         "angles": 6 * shares[:3] - 3,
         "mean": -A[2, :2],

@@ -61,6 +61,7 @@ def _complete(rng, wi, wm, alpha, e=None) -> Points:
         "wi": wi,
         "wo": wo,
         "wm": wm,
+        "slope": -wm[:2] / np.where(wm[2] > 0, wm[2], 1),
         "v": wm,
         "alpha": alpha,
         "A": A,

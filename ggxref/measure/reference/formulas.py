@@ -25,54 +25,54 @@ def stands_for(name):
     return register
 
 
-def _dot(a, b):
+def dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _cross(a, b):
+def cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def _norm(a):
-    return sqrt(_dot(a, a))
+def norm(a):
+    return sqrt(dot(a, a))
 
 
-def _scaled(c, a):
+def scaled(c, a):
     return tuple(c * x for x in a)
 
 
-def _plus(a, b):
+def plus(a, b):
     return tuple(x + y for x, y in zip(a, b, strict=True))
 
 
 def unit(a):
-    n = _norm(a)
+    n = norm(a)
     n = where(n.hi > 0, n, 1.0)
     return tuple(x / n for x in a)
 
 
-def _apply(M, a):
-    return tuple(_dot(row, a) for row in M)
+def apply(M, a):
+    return tuple(dot(row, a) for row in M)
 
 
-def _columns(M):
+def columns(M):
     return tuple(zip(*M, strict=True))
 
 
-def _cofactor(A):
+def cofactor(A):
     a, b, c = A
-    return _cross(b, c), _cross(c, a), _cross(a, b)
+    return cross(b, c), cross(c, a), cross(a, b)
 
 
-def _det(A):
-    return _dot(A[0], _cross(A[1], A[2]))
+def det(A):
+    return dot(A[0], cross(A[1], A[2]))
 
 
 def _positive(x):
     return maximum(x, 0.0)
 
 
-def _over(a, b):
+def over(a, b):
     zero = b.hi == 0
     return where(zero, 0.0, a / where(zero, 1.0, b))
 
@@ -117,10 +117,10 @@ def ndf_student_t(wm, alpha, gamma):
 @stands_for("ndf.ellipsoid")
 def ndf_ellipsoid(wm, A):
     wm = unit(wm)
-    det = _det(A)
-    stretched = _scaled(1.0 / det, _apply(_cofactor(A), wm))
-    square = _dot(stretched, stretched)
-    return where(wm[2].hi > 0, 1.0 / (PI * abs(det) * _norm(_columns(A)[2]) * square * square), 0.0)
+    determinant = det(A)
+    stretched = scaled(1.0 / determinant, apply(cofactor(A), wm))
+    square = dot(stretched, stretched)
+    return where(wm[2].hi > 0, 1.0 / (PI * abs(determinant) * norm(columns(A)[2]) * square * square), 0.0)
 
 
 # masking
@@ -130,7 +130,7 @@ def _flat(w, alpha):
     return (alpha[0] * w[0]) * (alpha[0] * w[0]) + (alpha[1] * w[1]) * (alpha[1] * w[1])
 
 
-def _sigma_ggx(w, alpha):
+def sigma_ggx(w, alpha):
     square = _flat(w, alpha)
     t = sqrt(square + w[2] * w[2])
     below = w[2].hi < 0
@@ -142,7 +142,7 @@ def _up(w):
 
 
 def _front(w, wm):
-    return np.sign(_dot(w, wm).hi) * np.sign(w[2].hi) > 0
+    return np.sign(dot(w, wm).hi) * np.sign(w[2].hi) > 0
 
 
 @stands_for("masking.lambda_ggx")
@@ -173,7 +173,7 @@ def _ierfc_coefficients(count=52) -> list[DD]:
         return found
 
 
-def _gaussian_area(w, alpha):
+def gaussian_area(w, alpha):
     """|z| Λ = s ierfc(|z|/s)/2."""
     flat = _flat(w, alpha)
     s = sqrt(flat)
@@ -193,46 +193,46 @@ def _gaussian_area(w, alpha):
 @stands_for("masking.lambda_beckmann")
 def masking_lambda_beckmann(w, alpha):
     w = unit(w)
-    return _gaussian_area(w, alpha) / abs(w[2])
+    return gaussian_area(w, alpha) / abs(w[2])
 
 
 @stands_for("masking.g1_ggx")
 def masking_g1_ggx(w, wm, alpha):
     up = _up(unit(w))
-    return where(_front(w, wm), up[2] / _sigma_ggx(up, alpha), 0.0)
+    return where(_front(w, wm), up[2] / sigma_ggx(up, alpha), 0.0)
 
 
 @stands_for("masking.g1_beckmann")
 def masking_g1_beckmann(w, wm, alpha):
     up = _up(unit(w))
-    return where(_front(w, wm), _over(up[2], up[2] + _gaussian_area(up, alpha)), 0.0)
+    return where(_front(w, wm), over(up[2], up[2] + gaussian_area(up, alpha)), 0.0)
 
 
 @stands_for("masking.g1_v_cavity")
 def masking_g1_v_cavity(w, wm):
     w, wm = unit(w), unit(wm)
-    return where(_front(w, wm), minimum(_over(2.0 * abs(wm[2] * w[2]), abs(_dot(w, wm))), 1.0), 0.0)
+    return where(_front(w, wm), minimum(over(2.0 * abs(wm[2] * w[2]), abs(dot(w, wm))), 1.0), 0.0)
 
 
 def _sigma_ellipsoid(w, A):
-    n = _columns(A)[2]
-    Aw = _apply(A, w)
-    product, cosine = _norm(Aw) * _norm(n), _dot(Aw, n)
-    cross = _cross(Aw, n)
+    n = columns(A)[2]
+    Aw = apply(A, w)
+    product, cosine = norm(Aw) * norm(n), dot(Aw, n)
+    normal = cross(Aw, n)
     below = cosine.hi < 0
-    total = where(below, _dot(cross, cross) / where(below, product - cosine, 1.0), product + cosine)
-    return total / (2.0 * _dot(n, n))
+    total = where(below, dot(normal, normal) / where(below, product - cosine, 1.0), product + cosine)
+    return total / (2.0 * dot(n, n))
 
 
 @stands_for("masking.g1_ellipsoid")
 def masking_g1_ellipsoid(w, wm, A):
     up = _up(unit(w))
-    return where(_front(w, wm), minimum(_over(up[2], _sigma_ellipsoid(up, A)), 1.0), 0.0)
+    return where(_front(w, wm), minimum(over(up[2], _sigma_ellipsoid(up, A)), 1.0), 0.0)
 
 
 @stands_for("masking.g2_height_correlated")
 def masking_g2_height_correlated(g1_i, g1_o):
-    return _over(g1_i * g1_o, g1_i + g1_o - g1_i * g1_o)
+    return over(g1_i * g1_o, g1_i + g1_o - g1_i * g1_o)
 
 
 @stands_for("masking.g2_separable")
@@ -260,7 +260,7 @@ def fresnel_dielectric(cos_i, eta):
     c = abs(cos_i)
     square = 1.0 - eta * eta + (eta * c) * (eta * c)
     ct = sqrt(square)
-    s, p = _over(eta * c - ct, eta * c + ct), _over(c - eta * ct, c + eta * ct)
+    s, p = over(eta * c - ct, eta * c + ct), over(c - eta * ct, c + eta * ct)
     value = (s * s + p * p) * 0.5
     gap = (1.0 - eta * eta).hi
     return where(gap == 0, 0.0, where((square.hi <= 0) & (gap < 0), 1.0, value))
@@ -275,68 +275,14 @@ def fresnel_conductor(cos_i, eta, k):
     # (a + ib)² = real + 2iηk; the smaller of a and b from their product.
     large = sqrt((modulus + abs(real)) * 0.5)
     a = where(real.hi >= 0, large, eta * k / large)
-    s = _over(modulus + cc - 2.0 * a * c, modulus + cc + 2.0 * a * c)
+    s = over(modulus + cc - 2.0 * a * c, modulus + cc + 2.0 * a * c)
     mixed, straight = 2.0 * a * c * ss, modulus * cc + ss * ss
-    return s * (1.0 + _over(straight - mixed, straight + mixed)) * 0.5
-
-
-# jacobians, directions, areas
-
-
-@stands_for("jacobian.reflection")
-def jacobian_reflection(wo, wm):
-    return 1.0 / (4.0 * abs(_dot(unit(wo), unit(wm))))
-
-
-@stands_for("jacobian.refraction")
-def jacobian_refraction(wi, wo, wm, n_i, n_o):
-    wi, wo, wm = unit(wi), unit(wo), unit(wm)
-    o = _dot(wo, wm)
-    total = n_i * _dot(wi, wm) + n_o * o
-    return n_o * n_o * abs(o) / (total * total)
-
-
-@stands_for("jacobian.slope")
-def jacobian_slope(wm):
-    z = unit(wm)[2]
-    return 1.0 / (z * z * z)
-
-
-@stands_for("jacobian.linear")
-def jacobian_linear(wm, M):
-    stretched = _norm(_apply(M, unit(wm)))
-    return abs(_det(M)) / (stretched * stretched * stretched)
-
-
-@stands_for("ellipsoid.projected_area")
-def ellipsoid_projected_area(w, A, size):
-    return PI * size * size * _norm(_apply(A, unit(w))) / abs(_det(A))
-
-
-@stands_for("ellipsoid.lune_area")
-def ellipsoid_lune_area(u, v, A, size):
-    u, v = _apply(A, unit(u)), _apply(A, unit(v))
-    product, cosine = _norm(u) * _norm(v), _dot(u, v)
-    cross = _cross(u, v)
-    below = cosine.hi < 0
-    total = where(below, _dot(cross, cross) / where(below, product - cosine, 1.0), product + cosine)
-    return PI * size * size * total / (2.0 * abs(_det(A)) * _norm(v))
-
-
-@stands_for("geometry.reflect")
-def geometry_reflect(w, wm):
-    w, wm = unit(w), unit(wm)
-    return _plus(_scaled(2.0 * _dot(w, wm), wm), _scaled(-1.0, w))
-
-
-@stands_for("geometry.half_reflection")
-def geometry_half_reflection(wi, wo):
-    return unit(_plus(unit(wi), unit(wo)))
+    return s * (1.0 + over(straight - mixed, straight + mixed)) * 0.5
 
 
 @stands_for("bsdf.brdf_ggx")
 def bsdf_brdf_ggx(wi, wo, alpha):
-    wm, z_i, z_o = geometry_half_reflection(wi, wo), unit(wi)[2], unit(wo)[2]
+    wm, z_i, z_o = unit(plus(unit(wi), unit(wo))), unit(wi)[2], unit(wo)[2]
     seen = (z_i.hi > 0) & (z_o.hi > 0)
     G2 = masking_g2_height_correlated(masking_g1_ggx(wi, wm, alpha), masking_g1_ggx(wo, wm, alpha))
     return where(seen, ndf_ggx(wm, alpha) * G2 / where(seen, 4.0 * z_i * z_o, 1.0), 0.0)
@@ -346,13 +292,13 @@ def bsdf_brdf_ggx(wi, wo, alpha):
 
 
 def _visible(wm, wi, D, sigma):
-    cosine = _dot(unit(wi), unit(wm))
-    return where(cosine.hi > 0, _over(cosine * D, sigma), 0.0)
+    cosine = dot(unit(wi), unit(wm))
+    return where(cosine.hi > 0, over(cosine * D, sigma), 0.0)
 
 
 @stands_for("sampling.spherical_cap.pdf")
 def sampling_spherical_cap_pdf(wm, wi, alpha):
-    return _visible(wm, wi, ndf_ggx(wm, alpha), _sigma_ggx(unit(wi), alpha))
+    return _visible(wm, wi, ndf_ggx(wm, alpha), sigma_ggx(unit(wi), alpha))
 
 
 @stands_for("sampling.ellipsoid_cap.pdf")

@@ -53,14 +53,14 @@ def sampling_cross_section_sample(u, wi, alpha):
     i = f.unit(_sphere(wi, alpha))
     flat, cos_i, sin_i = _azimuth(i, (0.0, -1.0))
     w1 = -sin_i, cos_i, flat * 0.0
-    w2 = f._cross(i, w1)
+    w2 = f.cross(i, w1)
     c, s = cos_sin_turn(u[0])
     r = sqrt(u[1])
     t1, t2 = r * c, r * s
     blend = (1.0 + i[2]) * 0.5
     t2 = (1.0 - blend) * sqrt(1.0 - t1 * t1) + blend * t2
     t3 = sqrt(1.0 - t1 * t1 - t2 * t2)
-    x, y, z = f._plus(f._plus(f._scaled(t1, w1), f._scaled(t2, w2)), f._scaled(t3, i))
+    x, y, z = f.plus(f.plus(f.scaled(t1, w1), f.scaled(t2, w2)), f.scaled(t3, i))
     return f.unit((alpha[0] * x, alpha[1] * y, f._positive(z)))
 
 
@@ -116,24 +116,24 @@ def sampling_lune_sample(u, wi, A):
     r, other = where(wide, a, b), where(wide, b, a)
     c, s = cos_sin_turn(other / (8.0 * where(r.hi == 0, 1.0, r)))
     along, across = r * where(wide, c, s), r * where(wide, s, c)
-    e3, pole = f.unit(f._apply(A, wi)), f.unit(f._columns(A)[2])
-    e2 = f.unit(f._cross(e3, pole))
-    e1 = f._cross(e2, e3)
-    share = (1.0 + f._dot(e3, pole)) * 0.5
+    e3, pole = f.unit(f.apply(A, wi)), f.unit(f.columns(A)[2])
+    e2 = f.unit(f.cross(e3, pole))
+    e1 = f.cross(e2, e3)
+    share = (1.0 + f.dot(e3, pole)) * 0.5
     moved = share * along + (1.0 - share) * sqrt((1.0 - across) * (1.0 + across))
     lifted = sqrt(1.0 - moved * moved - across * across)
-    p = f._plus(f._plus(f._scaled(moved, e1), f._scaled(across, e2)), f._scaled(lifted, e3))
-    return f.unit(f._apply(f._columns(A), p))
+    p = f.plus(f.plus(f.scaled(moved, e1), f.scaled(across, e2)), f.scaled(lifted, e3))
+    return f.unit(f.apply(f.columns(A), p))
 
 
 def _canonical(A):
     """(c00, c10, c11, ex, ey) by the Cholesky factor of S = AᵀA/‖An‖², as design.md defines it."""
-    rows = f._columns(A)
-    n = f._dot(rows[2], rows[2])
-    ex, ey = f._dot(rows[0], rows[2]) / n, f._dot(rows[1], rows[2]) / n
-    c00 = sqrt(f._dot(rows[0], rows[0]) / n - ex * ex)
-    c10 = (f._dot(rows[0], rows[1]) / n - ex * ey) / c00
-    return c00, c10, abs(f._det(A)) / (n * sqrt(n) * c00), ex, ey
+    rows = f.columns(A)
+    n = f.dot(rows[2], rows[2])
+    ex, ey = f.dot(rows[0], rows[2]) / n, f.dot(rows[1], rows[2]) / n
+    c00 = sqrt(f.dot(rows[0], rows[0]) / n - ex * ex)
+    c10 = (f.dot(rows[0], rows[1]) / n - ex * ey) / c00
+    return c00, c10, abs(f.det(A)) / (n * sqrt(n) * c00), ex, ey
 
 
 def _in_canonical_cap(u, wi, canonical, cut):
@@ -172,11 +172,11 @@ def sampling_normals_pdf_beckmann(wm, alpha):
 @stands_for("sampling.slope_beckmann.pdf")
 def sampling_slope_beckmann_pdf(wm, wi, alpha):
     wi = f.unit(wi)
-    return f._visible(wm, wi, f.ndf_beckmann(wm, alpha), f._positive(wi[2]) + f._gaussian_area(wi, alpha))
+    return f._visible(wm, wi, f.ndf_beckmann(wm, alpha), f._positive(wi[2]) + f.gaussian_area(wi, alpha))
 
 
 @stands_for("sampling.v_cavity.pdf")
 def sampling_v_cavity_pdf(wm, wi, alpha):
     wm, wi = f.unit(wm), f.unit(wi)
-    a, b = (f._positive(f._dot(wi, m)) for m in (wm, (-wm[0], -wm[1], wm[2])))
-    return where(wi[2].hi > 0, 2.0 * f._over(a, a + b) * wm[2] * f.ndf_ggx(wm, alpha), 0.0)
+    a, b = (f._positive(f.dot(wi, m)) for m in (wm, (-wm[0], -wm[1], wm[2])))
+    return where(wi[2].hi > 0, 2.0 * f.over(a, a + b) * wm[2] * f.ndf_ggx(wm, alpha), 0.0)

@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 
 from ggxref import bsdf, fresnel, geometry, masking, ndf, stable
+from ggxref.measure.reference import REFERENCES
 from ggxref.measure.reference import formulas as reference
 from ggxref.measure.variants.densities import exact_dot
 from ggxref.measure.variants.form import Variant
@@ -11,7 +12,7 @@ from ggxref.measure.variants.form import Variant
 ETA, K = 0.125, 3.5
 BANDS = ((0.13, 4.0), (ETA, K), (0.15, 2.5))
 
-exact_half = reference.geometry_half_reflection
+exact_half = REFERENCES["geometry.half_reflection"]
 
 
 def exact_brdf(wi, wo, alpha):
