@@ -9,7 +9,7 @@ import numpy as np
 from jax import lax
 
 from ggxref._errorfree import fast_two_sum, two_product, two_sum
-from ggxref._pairs import Pair, choice
+from ggxref._pairs import Pair
 from ggxref._types import Real, Scalar
 from ggxref.stable import crude_quotient, reciprocal
 
@@ -23,10 +23,10 @@ def log1p(x: Scalar) -> Scalar:
 # Taylor coefficients of sin 2πv / v and cos 2πv in v²: on |v| <= 1/8 the first term left out is below half an ulp.
 _SIN = [(-1) ** k * (2 * math.pi) ** (2 * k + 1) / math.factorial(2 * k + 1) for k in range(9)]
 _COS = [(-1) ** k * (2 * math.pi) ** (2 * k) / math.factorial(2 * k) for k in range(9)]
-_TAU_REST = 2.4492935982947064e-16  # of 2π, beyond its float64
+TAU_REST = 2.4492935982947064e-16  # of 2π, beyond its float64
 
 
-def _horner(coefficients, x):
+def horner(coefficients, x):
     value = jnp.full_like(x, coefficients[-1])
     for c in reversed(coefficients[:-1]):
         value = value * x + c
@@ -40,7 +40,7 @@ def _powers(chebyshev: tuple[float, ...], terms: int) -> dict[jnp.dtype, list[fl
     return {jnp.dtype("float32"): narrow, jnp.dtype("float64"): wide}
 
 
-def _two_word_powers(
+def two_word_powers(
     chebyshev: tuple[float, ...], rest: float, factor: tuple[float, float], terms: int
 ) -> dict[jnp.dtype, list[float]]:
     """As `_powers`, times a factor; the constant, which carries the digits, as a sum of two, as the factor is.
@@ -74,9 +74,9 @@ def cos_sin_turn(u: Real, terms: int | None = None) -> tuple[Scalar, Scalar]:
     square = v * v
     # 2π in two words: its rounding is as large as all others of the sine.
     tau = float(np.asarray(math.tau).astype(u.dtype))
-    rest = (math.tau - tau) + _TAU_REST
-    c = _horner(_COS[:cos_terms], square)
-    s = v * tau + v * (rest + square * _horner(_SIN[1:sin_terms], square))
+    rest = (math.tau - tau) + TAU_REST
+    c = horner(_COS[:cos_terms], square)
+    s = v * tau + v * (rest + square * horner(_SIN[1:sin_terms], square))
     return _turned(quarter, c, s)
 
 
@@ -117,9 +117,9 @@ def cos_sin_eighth(v: Pair) -> tuple[Pair, Pair]:
     square = turn * turn
     tau = float(np.asarray(math.tau).astype(turn.dtype))
     value, error = two_product(turn, jnp.full_like(turn, tau))
-    rest = error + turn * ((math.tau - tau) + _TAU_REST + square * _horner(_SIN[1:sin_terms], square))
+    rest = error + turn * ((math.tau - tau) + TAU_REST + square * horner(_SIN[1:sin_terms], square))
     s, s_rest = fast_two_sum(value, rest)
-    c, c_rest = fast_two_sum(jnp.ones_like(turn), square * _horner(_COS[1:cos_terms], square))
+    c, c_rest = fast_two_sum(jnp.ones_like(turn), square * horner(_COS[1:cos_terms], square))
     angle = math.tau * turn_rest
     return (c, c_rest - s * angle), (s, s_rest + c * angle)
 
@@ -139,7 +139,7 @@ def exp_minus(x: Scalar, rest: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     y, y_rest = k * high - x, k * low - rest
     both = y + y_rest
     m = 1 + y
-    curve = both * both * _horner(_EXP[:6] if x.dtype == jnp.float32 else _EXP, both)
+    curve = both * both * horner(_EXP[:6] if x.dtype == jnp.float32 else _EXP, both)
     return m, ((1 - m) + y) + (y_rest + curve), k
 
 
@@ -188,7 +188,7 @@ def log1p_over_square(a: Pair, z: Scalar) -> tuple[Pair, Pair]:
     s_rest = (((top - product) - error) + (top_rest - s * (bottom_rest + (m_rest + square_rest)))) * inverse
     high, low = _LN2[s.dtype]
     value, rest = two_sum(k * high, 2 * s)
-    beyond = s * s * s * _horner(_ARTANH[:6] if s.dtype == jnp.float32 else _ARTANH, s * s)
+    beyond = s * s * s * horner(_ARTANH[:6] if s.dtype == jnp.float32 else _ARTANH, s * s)
     return fast_two_sum(value, rest + (2 * (s_rest + beyond) + k * low)), (total, share)
 
 
@@ -231,12 +231,12 @@ _IERFC = (
 _IERFC_REST = 1.0602091124949601e-16  # of the first, beyond float64
 _ROOT_PI, _ROOT_PI_REST = math.sqrt(math.pi), 1.453787399267733e-16
 _IERFC_POWERS = _powers(_IERFC, 13)
-_HALF_IERFC = _two_word_powers(_IERFC, _IERFC_REST, (0.28209479177387814, 3.83386490329147e-18), 13)  # over 2 sqrt(pi)
+_HALF_IERFC = two_word_powers(_IERFC, _IERFC_REST, (0.28209479177387814, 3.83386490329147e-18), 13)  # over 2 sqrt(pi)
 
 
 def _ierfc_scaled(a):
     """exp(a²) ierfc(a) for a >= 0."""
-    return _horner(_IERFC_POWERS[a.dtype], (a - 3) / (a + 3)) / (_ROOT_PI * (1 + a * (_ROOT_PI + 2 * a)))
+    return horner(_IERFC_POWERS[a.dtype], (a - 3) / (a + 3)) / (_ROOT_PI * (1 + a * (_ROOT_PI + 2 * a)))
 
 
 def half_ierfc(a: Scalar, square: Pair) -> tuple[Pair, Pair, Scalar]:
@@ -250,7 +250,7 @@ def half_ierfc(a: Scalar, square: Pair) -> tuple[Pair, Pair, Scalar]:
     """
     first, first_rest, *others = _HALF_IERFC[a.dtype]
     t = 1 - 6 * reciprocal(a + 3)
-    series, series_rest = fast_two_sum(jnp.asarray(first, a.dtype), t * _horner(others, t) + first_rest)
+    series, series_rest = fast_two_sum(jnp.asarray(first, a.dtype), t * horner(others, t) + first_rest)
     m, m_rest, k = exp_minus(*square)
     numerator, lost = two_product(m, series)
     double, double_rest = two_sum(2 * square[0], jnp.ones_like(a))
@@ -268,129 +268,5 @@ def gaussian_tails(a: Scalar) -> tuple[Scalar, Scalar]:
     """`exp(a²) erfc(a)` and `exp(a²) ierfc(a)` for `a >= 0`: the tails without their underflow."""
     scaled = _ierfc_scaled(a)
     small = a < 0.5
-    direct = _horner(_ERFCX if a.dtype == jnp.float64 else _ERFCX[:16], jnp.where(small, a, 0))
+    direct = horner(_ERFCX if a.dtype == jnp.float64 else _ERFCX[:16], jnp.where(small, a, 0))
     return jnp.where(small, direct, (1 / math.sqrt(math.pi) - scaled) / jnp.where(small, 1, a)), scaled
-
-
-# Taylor coefficients of (sin x − x)/x³ and (cos x − 1 + x²/2)/x⁴ in x².
-_SINE = [(-1) ** k / math.factorial(2 * k + 1) for k in range(1, 10)]
-_COSINE = [(-1) ** k / math.factorial(2 * k) for k in range(2, 11)]
-
-
-# Chebyshev coefficients of E/4π over w = v^(1/3), in 8 w² − 1, and of (π − E)/4π over d = 1/2 − v, in 128 d²/9 − 1: E of
-# `kepler`, up to v = 1/8 and from there on. tests/test_stable.py computes them again with arb.
-_KEPLER_NEAR = (
-    0.27373137601720254,
-    0.007135259045858628,
-    0.00024371797026280213,
-    1.0855022415556047e-05,
-    5.481501206835336e-07,
-    2.978469451636786e-08,
-    1.6980439530995776e-09,
-    1.0014660759912268e-10,
-    6.057314463054036e-12,
-    3.735866874587357e-13,
-    2.3401426544559826e-14,
-    1.4845159694774116e-15,
-    9.516738185171933e-17,
-)
-_KEPLER_FAR = (
-    0.26887894686018443,
-    0.020660468553657853,
-    0.002002799141877438,
-    0.0002526200015789652,
-    3.613616561824433e-05,
-    5.564513787932918e-06,
-    8.993386696716911e-07,
-    1.5040441726102928e-07,
-    2.5800911710162963e-08,
-    4.5137433332609895e-09,
-    8.02091179414251e-10,
-    1.4435679356584195e-10,
-    2.625662276966304e-11,
-    4.818482423580063e-12,
-    8.910240037646088e-13,
-    1.6585487164549058e-13,
-    3.105016650813989e-14,
-    5.84249781510308e-15,
-    1.1042933395719963e-15,
-    2.095624866272094e-16,
-    3.991253708041466e-17,
-    7.626422005656268e-18,
-)
-
-# What their first coefficients have beyond float64.
-_KEPLER_RESTS = 1.7946030696967673e-17, 1.7949918229824025e-17
-
-
-_NEAR, _FAR = (
-    _two_word_powers(series, rest, (math.tau, _TAU_REST), terms)  # of E/2
-    for series, rest, terms in zip((_KEPLER_NEAR, _KEPLER_FAR), _KEPLER_RESTS, (7, 11), strict=True)
-)
-
-# The bits of 1/∛x are these less a third of those of x, to within 4 %.
-_CBRT = {jnp.dtype("float32"): (jnp.int32, 0x54A2328C, 2), jnp.dtype("float64"): (jnp.int64, 0x553EF0FF289DD796, 3)}
-
-
-def _cbrt(x):
-    r"""$\sqrt[3]x$ for 0 <= x <= 1, and what its rounding left out: XLA's is a power."""
-    integer, magic, steps = _CBRT[x.dtype]
-    small = x < 2.0**-60  # whose products would be subnormal
-    x, scale = jnp.where(small, x * 2.0**60, x), jnp.where(small, 2.0**-20, 1).astype(x.dtype)
-    third = (lax.bitcast_convert_type(x, integer).astype(x.dtype) / 3).astype(integer)
-    inverse = lax.bitcast_convert_type(integer(magic) - third, x.dtype)
-    for _ in range(steps):
-        inverse = inverse * (4 - x * inverse * inverse * inverse) / 3
-    square, square_rest = two_product(inverse, inverse)
-    root, rest = two_product(x, square)
-    product, product_rest = two_product(root, inverse)
-    # x inverse³ is 1 but for three times the error of the inverse.
-    off = (1 - product) - (product_rest + (rest + x * square_rest) * inverse)
-    return fast_two_sum(root * scale, (rest + x * square_rest + root * off * (2 / 3)) * scale)
-
-
-def _odd(series, x, rest, t):
-    """`x` times the series at `t`, of which all but the constant are small, in two words."""
-    constant, constant_rest, *others = series
-    value, error = two_product(x, jnp.asarray(constant, x.dtype))
-    return fast_two_sum(value, x * (t * _horner(others, t) + constant_rest) + (rest * constant + error))
-
-
-def _cos_sin(angle, rest):
-    """Cosine and sine of an angle in [0, 0.9], each of two words: what is not exact is small."""
-    wide = angle.dtype == jnp.float64
-    square, square_rest = two_product(angle, angle)
-    high = 1 - square / 2
-    lost = (1 - high) - square / 2
-    s = fast_two_sum(angle, rest * high + angle * (square * _horner(_SINE[: 9 if wide else 5], square)))
-    beyond = square * square * _horner(_COSINE[: 9 if wide else 5], square) - (square_rest / 2 + s[0] * rest)
-    return fast_two_sum(high, lost + beyond), s
-
-
-@jax.custom_jvp
-def kepler(v: Real) -> tuple[Scalar, Scalar]:
-    """`kepler_pairs`, rounded; with a derivative."""
-    (c, c_rest), (s, s_rest) = kepler_pairs(jnp.asarray(v))
-    return c + c_rest, s + s_rest
-
-
-def kepler_pairs(v: Scalar) -> tuple[Pair, Pair]:
-    r"""$(\cos\frac E2, \sin\frac E2)$ for the root E in [0, π] of $E - \sin E = 2\pi v$, `v` in [0, 1/2]: Kepler's equation at
-    eccentricity 1.
-
-    E/2 is the angle that cuts the fraction `v` of a disk's area, so this inverts the marginal of a uniform disk. E is an odd
-    function of the cube root of `v`, π − E one of 1/2 − v; the cosine takes its digits from the latter.
-    """
-    upper = v > 0.125
-    (w, w_rest), d = _cbrt(jnp.where(upper, 0, v)), 0.5 - v
-    near = _odd(_NEAR[v.dtype], w, w_rest, 8 * w * w - 1)
-    far = _odd(_FAR[v.dtype], d, (0.5 - d) - v, (128 / 9) * d * d - 1)
-    c, s = _cos_sin(*(jnp.where(upper, y, x) for x, y in zip(near, far, strict=True)))
-    return choice(upper, s, c), choice(upper, c, s)
-
-
-@kepler.defjvp
-def _kepler_jvp(primals, tangents):
-    c, s = kepler(*primals)
-    turn = jnp.where(s > 0, math.pi / 2 / jnp.where(s > 0, s, 1), 0)  # of E/2, times sin E/2
-    return (c, s), (-turn * tangents[0], turn * (c / jnp.where(s > 0, s, 1)) * tangents[0])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 
-from ggxref import _special, bsdf, ndf, slopes, stable
+from ggxref import _kepler, bsdf, ndf, slopes, stable
 from ggxref.ellipsoid import canonical, canonical_frame, canonical_terms
 from ggxref.measure.accuracy import measure
 from ggxref.measure.reference import REFERENCES
@@ -147,7 +147,7 @@ def slopes_by_angles(u, wi, alpha):
     """The slope sampler with ψ itself, as the difference of two angles."""
     x, y, z = stable.unit(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
     psi = jnp.arcsin(u[0] * (1 + z) - z) - jnp.arccos(z)
-    c, s = _special.kepler(jnp.minimum(u[1], 1 - u[1]))
+    c, s = _kepler.kepler(jnp.minimum(u[1], 1 - u[1]))
     along, across = -jnp.sin(psi) * s, jnp.where(u[1] > 0.5, -c, c)
     cos_i, sin_i = stable.azimuth(x, y)
     h = cos_i * along - sin_i * across, sin_i * along + cos_i * across, jnp.cos(psi) * s

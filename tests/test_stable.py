@@ -9,7 +9,7 @@ import pytest
 from flint import arb
 from library import numbers
 
-from ggxref import _special, _squares, bsdf, fresnel, geometry, ndf, stable
+from ggxref import _kepler, _special, _squares, bsdf, fresnel, geometry, ndf, stable
 from ggxref._errorfree import fast_two_sum, two_product, two_sum
 from ggxref.oracle.precision import working
 from ggxref.sampling import ellipsoid_cap, normals
@@ -340,8 +340,8 @@ def test_kepler_coefficients():
         d = (9 * (1 + t) / 128).sqrt()
         return (arb.pi() - eccentric_anomaly((arb(1) / 2 - d).mid())) / (4 * arb.pi() * d)
 
-    tables = (_special._KEPLER_NEAR, _special._KEPLER_FAR)
-    for function, table, rest in zip((near, far), tables, _special._KEPLER_RESTS, strict=True):
+    tables = (_kepler._KEPLER_NEAR, _kepler._KEPLER_FAR)
+    for function, table, rest in zip((near, far), tables, _kepler._KEPLER_RESTS, strict=True):
         with working(400):
             *true, first_left_out = chebyshev(function, len(table) + 1, 64)
             (beyond,) = chebyshev(lambda t, f=function, first=table[0]: f(t) - first, 1, 64)
@@ -355,7 +355,7 @@ def test_kepler(dtype):
     v = np.exp(rng().uniform(-30, np.log(0.5), N))
     v[::2] = 0.5 - v[::2] / 1.01
     v = np.concatenate([v, np.exp(rng().uniform(-80, -30, 64))]).astype(dtype)
-    c, s = jax.jit(jax.vmap(_special.kepler))(v)
+    c, s = jax.jit(jax.vmap(_kepler.kepler))(v)
 
     def corrected(c, s, v):  # Newton's step from the result is its error
         E = 2 * arb.atan2(s, c)
@@ -370,11 +370,11 @@ def test_kepler(dtype):
 
 def test_kepler_derivative(dtype):
     v = np.array([1e-6, 0.1, 0.25, 0.49], dtype)
-    c, s = (np.asarray(x, np.float64) for x in jax.vmap(_special.kepler)(v))
-    by_c, by_s = jax.vmap(jax.jacfwd(_special.kepler))(v)
+    c, s = (np.asarray(x, np.float64) for x in jax.vmap(_kepler.kepler)(v))
+    by_c, by_s = jax.vmap(jax.jacfwd(_kepler.kepler))(v)
     np.testing.assert_allclose(by_c, -np.pi / (2 * s), rtol=16 * epsilon(dtype))
     np.testing.assert_allclose(by_s, np.pi * c / (2 * s * s), rtol=16 * epsilon(dtype))
-    assert jax.jacfwd(_special.kepler)(jnp.asarray(0, dtype)) == (0, 0)
+    assert jax.jacfwd(_kepler.kepler)(jnp.asarray(0, dtype)) == (0, 0)
 
 
 def test_one_loop_changes_nothing(dtype):

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from ggxref import _special, stable
+from ggxref import _kepler, stable
 from ggxref._errorfree import two_product, two_sum
 from ggxref._pairs import choice, less, minus, one_pass, product, rounded, scaled, square_root, sum_by_squares, total
 from ggxref._types import Vec2, Vec3
@@ -45,7 +45,7 @@ def _point(u, i):
     X, Y, S, flat, norm_square, rise, fall = one_pass(*ray(i, (one, zero)))
     sin_psi, cos_psi = one_pass(*_along_in_two_words(u[0], flat, i[2], norm_square, rise, fall))
     upper = u[1] > 0.5
-    c, s = one_pass(*_special.kepler_pairs(jnp.where(upper, 1 - u[1], u[1])))
+    c, s = one_pass(*_kepler.kepler_pairs(jnp.where(upper, 1 - u[1], u[1])))
     along, across = product(sin_psi, s), product(norm_square, choice(upper, minus(c), c))
     x, y = total(product(X, along), product(Y, across)), less(product(X, across), product(Y, along))
     return minus(x), y, product(S, product(cos_psi, s))
@@ -80,7 +80,7 @@ def _plain_point(u, x, y, z):
     sin_psi, cos_psi, length = _along(u[0], flat, z, square)
     upper = u[1] > 0.5
     # In a loop of their own: each component that takes them would compute them again.
-    c, s = stable.one_loop(*_special.kepler(jnp.where(upper, 1 - u[1], u[1])))
+    c, s = stable.one_loop(*_kepler.kepler(jnp.where(upper, 1 - u[1], u[1])))
     along, across = -sin_psi * s, length * jnp.where(upper, -c, c)
     cos_i, sin_i, one = _azimuth(x, y, flat)
     return cos_i * along - sin_i * across, sin_i * along + cos_i * across, one * (cos_psi * s)
