@@ -14,9 +14,10 @@ from jax.scipy.special import erfc
 from jaxtyping import Bool
 
 from ggxref import _pairs, _squares, stable
+from ggxref._lune_sum import lune_parts, weighted
+from ggxref._matrix import length, near_one, plain_cross, plain_dot, times
 from ggxref._pairs import Triple
 from ggxref._types import Mat3, Real, Scalar
-from ggxref.ellipsoid import length, lune_parts, near_one, plain_cross, plain_dot, times, weighted
 
 Two = tuple[Scalar, Scalar]
 

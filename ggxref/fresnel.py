@@ -11,8 +11,8 @@ import jax.numpy as jnp
 from jax import lax
 
 from ggxref import _squares, stable
+from ggxref._matrix import reciprocal_scale
 from ggxref._types import Real, Scalar
-from ggxref.ellipsoid import reciprocal_scale
 
 
 @stable.widened

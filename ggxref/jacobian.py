@@ -4,8 +4,9 @@ import jax
 import jax.numpy as jnp
 
 from ggxref import _pairs, stable
+from ggxref._matrix import near_one
 from ggxref._types import Mat3, Real, Scalar, Vec3
-from ggxref.ellipsoid import determinant, near_one
+from ggxref.ellipsoid import determinant
 
 
 @stable.widened

@@ -10,8 +10,9 @@ import jax.numpy as jnp
 from jax import lax
 
 from ggxref import _squares, stable
+from ggxref._matrix import near_one
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
-from ggxref.ellipsoid import inverse_square, near_one
+from ggxref.ellipsoid import inverse_square
 from ggxref.slopes import gaussian, student
 
 

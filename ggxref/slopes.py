@@ -12,10 +12,11 @@ import jax.numpy as jnp
 from jax import lax
 
 from ggxref import _pairs, _special, _squares, stable
+from ggxref._canonical import canonical_terms
 from ggxref._errorfree import two_product, two_sum
+from ggxref._matrix import reciprocal_scale
 from ggxref._seen import area_ggx, over_beckmann, over_ggx
 from ggxref._types import Mat3, Real, Scalar, Vec2, Vec3
-from ggxref.ellipsoid import canonical_terms, reciprocal_scale
 
 
 @stable.widened

@@ -309,7 +309,7 @@ def unit(x: Scalar, y: Scalar, z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     """The components divided by their length; the zero vector stays zero, with a zero gradient.
 
     For lengths whose square the dtype holds, in float32 from 2e-19 to 1.8e19: shorter ones come out with any length up to 7, longer
-    ones as NaN. What is normalised here is near 1 by construction, or was scaled before (`ellipsoid.reciprocal_scale`): to scale
+    ones as NaN. What is normalised here is near 1 by construction, or was scaled before (`_matrix.reciprocal_scale`): to scale
     each would cost every sampler.
     """
     x, y, z = turning(x, y, z)

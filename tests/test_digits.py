@@ -10,7 +10,8 @@ import pytest
 from flint import arb, ctx
 
 from ggxref import _kepler, bsdf, ndf, slopes, stable
-from ggxref.ellipsoid import canonical, canonical_frame, canonical_terms
+from ggxref._canonical import canonical_frame, canonical_terms
+from ggxref.ellipsoid import canonical
 from ggxref.measure.accuracy import measure
 from ggxref.measure.reference import REFERENCES
 from ggxref.measure.regions import skewed

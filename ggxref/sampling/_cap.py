@@ -7,10 +7,11 @@ import jax.numpy as jnp
 from jax import lax
 
 from ggxref import _pairs, _special
+from ggxref._canonical import Canonical
 from ggxref._errorfree import two_sum
+from ggxref._matrix import length
 from ggxref._pairs import Pair, Pairs, less, one_pass, product, square_root, total
 from ggxref._types import Real, Scalar, Turn, Vec2, Vec3
-from ggxref.ellipsoid import Canonical, length
 from ggxref.sampling._ellipsoid import poles, shortened, to_sphere
 from ggxref.sampling._sphere import incident, sum_in_cap
 

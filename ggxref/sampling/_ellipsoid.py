@@ -7,9 +7,10 @@ import functools
 import jax.numpy as jnp
 
 from ggxref import _pairs, stable
+from ggxref._canonical import Canonical
+from ggxref._matrix import reciprocal_scale
 from ggxref._pairs import Pair, Pairs, Triple
 from ggxref._types import Scalar, Vec3
-from ggxref.ellipsoid import Canonical, reciprocal_scale
 
 Two = tuple[Scalar, Scalar]
 

@@ -10,6 +10,7 @@ from jax import lax
 
 from ggxref import _special, stable
 from ggxref._errorfree import two_sum
+from ggxref._matrix import length
 from ggxref._pairs import (
     Pair,
     Pairs,
@@ -26,7 +27,6 @@ from ggxref._pairs import (
     total,
 )
 from ggxref._types import Scalar, Vec2
-from ggxref.ellipsoid import length
 from ggxref.sampling._ellipsoid import Two, ray
 from ggxref.sampling._sphere import crescent, incident
 

@@ -3,9 +3,9 @@
 import jax.numpy as jnp
 
 from ggxref import _special, ndf, stable
+from ggxref._matrix import length
 from ggxref._seen import over_ggx
 from ggxref._types import Scalar, Turn, Vec2, Vec3
-from ggxref.ellipsoid import length
 from ggxref.sampling._sphere import half_in_cap, ray, unstretch
 
 

@@ -9,10 +9,12 @@ $o_z' + i_z' \ge i_z/(\|A i\| \max_{\theta\le\theta_1} Q)$. At e = 0 and α ≤ 
 import jax.numpy as jnp
 
 from ggxref import _pairs, ndf, stable
+from ggxref._canonical import Canonical, canonical_terms
+from ggxref._matrix import length, near_one, normal_square
 from ggxref._pairs import Triple
 from ggxref._seen import area_ggx
 from ggxref._types import Mat3, Scalar, Turn, Vec2, Vec3
-from ggxref.ellipsoid import Canonical, canonical_terms, inverse_square, length, near_one, normal_square
+from ggxref.ellipsoid import inverse_square
 from ggxref.sampling._cap import half_vector
 from ggxref.sampling._ellipsoid import from_sphere, to_sphere
 

@@ -1,8 +1,8 @@
 """Visible normals of the ellipsoid NDF from a uniform spherical cap: dupuy2023's method after a linear map."""
 
 from ggxref import stable
+from ggxref._canonical import canonical_terms
 from ggxref._types import Mat3, Turn, Vec2, Vec3
-from ggxref.ellipsoid import canonical_terms
 from ggxref.sampling._cap import half_vector
 from ggxref.sampling._ellipsoid import from_sphere
 from ggxref.sampling._visible import pdf_ellipsoid as pdf

@@ -5,8 +5,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from ggxref import _special, stable
+from ggxref._canonical import canonical_frame
+from ggxref._matrix import length, near_one, times
 from ggxref._types import Mat3, Scalar, Vec2, Vec3
-from ggxref.ellipsoid import canonical_frame, cofactor, length, near_one, times
+from ggxref.ellipsoid import cofactor
 from ggxref.geometry import basis
 from ggxref.sampling._ellipsoid import image, risen, shortened, to_sphere
 from ggxref.sampling._lune import point

@@ -9,8 +9,8 @@ import numpy as np
 from jax.scipy.special import erfc
 
 from ggxref import _special, stable
+from ggxref._matrix import reciprocal_scale
 from ggxref._types import Scalar, Vec2, Vec3
-from ggxref.ellipsoid import reciprocal_scale
 from ggxref.sampling._sphere import unstretch
 from ggxref.sampling._visible import pdf_beckmann as pdf
 

@@ -6,9 +6,9 @@ from jax import lax
 
 from ggxref import _kepler, stable
 from ggxref._errorfree import two_product, two_sum
+from ggxref._matrix import length, reciprocal_scale
 from ggxref._pairs import choice, less, minus, one_pass, product, rounded, scaled, square_root, sum_by_squares, total
 from ggxref._types import Vec2, Vec3
-from ggxref.ellipsoid import length, reciprocal_scale
 from ggxref.sampling._ellipsoid import ray, shortened
 from ggxref.sampling._sphere import unstretch
 from ggxref.sampling._visible import pdf_ggx as pdf

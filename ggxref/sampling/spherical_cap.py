@@ -5,8 +5,8 @@ import math
 import jax.numpy as jnp
 
 from ggxref import _special, stable
+from ggxref._matrix import length
 from ggxref._types import Scalar, Turn, Vec2, Vec3
-from ggxref.ellipsoid import length
 from ggxref.sampling._sphere import half_in_cap, ray, unstretch
 from ggxref.sampling._visible import pdf_ggx as pdf
 

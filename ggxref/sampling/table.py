@@ -16,8 +16,8 @@ import numpy as np
 from jax import Array
 
 from ggxref import stable
+from ggxref._matrix import length
 from ggxref._types import Scalar, Vec2, Vec3
-from ggxref.ellipsoid import length
 from ggxref.sampling._sphere import incident, unstretch
 
 
