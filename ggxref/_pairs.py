@@ -178,7 +178,7 @@ def ratio(a: Pair, b: Pair) -> Pair:
 def square_root(a: Pair) -> Pair:
     """The square root; 0 for what rounding made negative."""
     zero = jnp.zeros_like(a[0])
-    a = choice(a[0] > 0, a, (zero, zero))
+    a = choice(a[0] <= 0, (zero, zero), a)  # not of NaN
     return root(a, stable.rsqrt(a[0]))
 
 

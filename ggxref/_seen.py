@@ -100,7 +100,7 @@ def _area_by(w, A):
     product = a_length * b_length
     h = tuple((total * c + d) / product for c, d in zip(a, plain_cross(n, a), strict=True))
     more = longer / (b_length * (a_length + jnp.abs(z) * b_length))  # ‖a‖/‖b‖ − |z|
-    aside = (2 * c / b_length**2 for c in plain_cross(b, n))  # (‖a‖/‖b‖) (a's direction − c b's)
+    aside = (2 * c / b_length**2 for c in plain_cross(b, n))  # 2 (‖a‖/‖b‖) (a's direction − c b's)
     upwards = (2 * total / b_length**2 * c for c in b)
     column = tuple(jnp.where(z < 0, more * c - t, s - more * c) for c, s, t in zip(h, aside, upwards, strict=True))
     return h, column, b_length

@@ -60,7 +60,8 @@ def _bell(x, y, a, b, c, factor):
     v = _pairs.ratio(_pairs.less(two_sum(*y), _pairs.product((c, zero), u)), (b, zero))
     q = _pairs.rounded(_pairs.square_of_pairs((one, zero), u, v))
     _, _, plain = _bell_parts(x, y, a, b, c)
-    return factor * _squares.lobe(a, b, jnp.where(plain < 1e37, q, plain))  # beyond, the second words are not there
+    end = float(jnp.finfo(plain.dtype).max) / 16  # beyond, the second words are not there
+    return factor * _squares.lobe(a, b, jnp.where(plain < end, q, plain))
 
 
 def _bell_parts(x, y, a, b, c):

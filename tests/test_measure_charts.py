@@ -3,6 +3,7 @@
 import csv
 import json
 import time
+import warnings
 from collections.abc import Callable
 from functools import partial
 
@@ -38,8 +39,10 @@ def test_a_peer_that_cannot_run_is_left_out(monkeypatch):
     """Dr.Jit aborts its process when LLVM is too old for it: never this one."""
     monkeypatch.setenv("DRJIT_LIBLLVM_PATH", "/nowhere")
     peers.runs.cache_clear()
-    assert peers.mitsuba(16) == {}
+    with warnings.catch_warnings(action="ignore"):
+        left = peers.mitsuba(16)
     peers.runs.cache_clear()
+    assert left == {}
 
 
 def test_a_compiled_subject_knows_its_compilation_time():

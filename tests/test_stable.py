@@ -9,7 +9,7 @@ import pytest
 from flint import arb
 from library import numbers
 
-from ggxref import _kepler, _special, _squares, bsdf, fresnel, geometry, ndf, stable
+from ggxref import _kepler, _pairs, _special, _squares, bsdf, fresnel, geometry, ndf, stable
 from ggxref._errorfree import fast_two_sum, two_product, two_sum
 from ggxref.oracle.precision import working
 from ggxref.sampling import ellipsoid_cap, normals
@@ -417,3 +417,9 @@ def test_a_number_beside_half_precision_leaves_it_half(half, x64):
         assert bsdf.weight_visible(g, g, 1.0).dtype == half
         assert fresnel.schlick(g, 0.04).dtype == half and fresnel.conductor(g, 0.2, 3.5).dtype == half
         assert geometry.refract(w, w, 1 / 1.5).dtype == half
+
+
+def test_roots_of_pairs_pass_nan_on_and_are_0_of_what_rounding_made_negative():
+    nan, zero = jnp.asarray(jnp.nan, jnp.float32), jnp.zeros((), jnp.float32)
+    assert jnp.isnan(_pairs.square_root((nan, zero))[0])
+    assert _pairs.square_root((zero - 1e-9, zero)) == (0, 0)

@@ -19,7 +19,7 @@ Azimuth = tuple[Pair, Pair]
 
 
 @jax.custom_jvp
-def half_in_cap(u: Vec2, azimuth: Azimuth, i: Pairs, cut: Scalar) -> Pairs:
+def half_in_two_words(u: Vec2, azimuth: Azimuth, i: Pairs, cut: Scalar) -> Pairs:
     """`_sphere.sum_in_cap` in units of i's length, whose largest component is near 1.
 
     - `azimuth`: (cos 2πu₀, sin 2πu₀). `cut`: in the unit of `i`.
@@ -40,20 +40,20 @@ def _plain(u, azimuth, i, cut):
     return h.x, h.y, h.z
 
 
-@half_in_cap.defjvp
-def _half_in_cap_jvp(primals, tangents):
+@half_in_two_words.defjvp
+def _half_in_two_words_jvp(primals, tangents):
     """A direction does not depend on the length of what it is made of, which is taken as constant."""
     (u, azimuth, i, cut), (du, dazimuth, di, dcut) = primals, tangents
     azimuth, i, dazimuth, di = (tuple(value for value, _ in a) for a in (azimuth, i, dazimuth, di))
     size = lax.stop_gradient(length(*i))
     _, change = jax.jvp(_plain, (u, azimuth, i, cut), (du, dazimuth, di, dcut))
     x, y, z = ((size * d, jnp.zeros_like(d)) for d in change)
-    return half_in_cap(*primals), (x, y, z)
+    return half_in_two_words(*primals), (x, y, z)
 
 
 def half_vector(u: Vec2, wi: Vec3, A: Canonical, cut: Real, turn: Turn | None) -> Pairs:
-    """`half_in_cap` about `A wi`. `cut`: in units of the length of `A wi`."""
+    """`half_in_two_words` about `A wi`. `cut`: in the unit of `A wi`."""
     i, scale = shortened(to_sphere(wi, A))
     azimuth = _special.two_word_turn(u[0]) if turn is None else tuple((c, jnp.zeros_like(c)) for c in turn(u[0]))
-    x, y, z = one_pass(*half_in_cap(u, azimuth, i, cut * scale))
+    x, y, z = one_pass(*half_in_two_words(u, azimuth, i, cut * scale))
     return x, y, z

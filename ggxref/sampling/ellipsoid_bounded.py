@@ -45,7 +45,7 @@ def _largest_q(wi: Vec3, A: Canonical):
 
 
 def _cut(wi, A):
-    """o'_z + i'_z at the cap's lower end, in units of ‖A ωi‖."""
+    """o'_z + i'_z at the cap's lower end, times ‖A ωi‖."""
     c_square, q = _largest_q(wi, A)
     return jnp.where(wi[2] <= 0, 0, wi[2] * (c_square / (c_square + q)))
 
