@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 
 from ggxref import _pairs, stable
-from ggxref._matrix import length, length_of_pairs, near_one, reciprocal_scale
+from ggxref._matrix import length, length_of_pairs, near_one, plain_cross, plain_dot, reciprocal_scale
 from ggxref._types import Mat3, Scalar
 
 
@@ -66,16 +66,15 @@ def _canonical_terms_jvp(primals, tangents):
 
 def _frame(A, n1, signed):
     r"""The columns of Q in $A = \|A n\|\,Q M$, Q orthogonal and M canonical."""
-    up, (x, y, z) = stable.unit(*A[:, 2]), stable.unit(*n1)
-    q1 = up[1] * z - up[2] * y, up[2] * x - up[0] * z, up[0] * y - up[1] * x
-    return q1, tuple(jnp.where(signed < 0, c, -c) for c in (x, y, z)), up
+    up, n = stable.unit(*A[:, 2]), stable.unit(*n1)
+    return plain_cross(up, n), tuple(jnp.where(signed < 0, c, -c) for c in n), up
 
 
 def _change(A, dA, terms, lower, frame):
     r"""What $Q^T dA/\|A n\|$ is beyond a scale of M and a turn of n: of the five numbers, and of `lower`, the 0 below c00."""
     c00, c10, c11, ex, ey = terms
     norm = length(*A[:, 2])
-    g = [[(q[0] * a[0] + q[1] * a[1] + q[2] * a[2]) / norm for a in dA.T] for q in frame]
+    g = [[plain_dot(q, a) / norm for a in dA.T] for q in frame]
     (g11, g12, g13), (g21, g22, g23), (g31, g32, g33) = g
     change = Canonical(
         g11 - ex * g13 - c00 * g33,

@@ -1,7 +1,6 @@
 """The factor of every lune's area, and so of every σ, in two words."""
 
 import jax
-import jax.numpy as jnp
 
 from ggxref import _pairs, stable
 from ggxref._matrix import length_of_pairs, plain_cross, plain_dot, times
@@ -29,36 +28,34 @@ def lune_parts(au, av):
     cosine = _pairs.inner(au, av)
     # Down to 110° the sum keeps its digits better.
     obtuse = cosine[0] < -product[0] / 3
-    zero, one = jnp.zeros_like(product[0]), jnp.ones_like(product[0])
-    divisor = _pairs.choice(obtuse, _pairs.less(product, cosine), (one, zero))
+    divisor = _pairs.or_one(obtuse, _pairs.less(product, cosine))
     conjugate = _pairs.ratio(_pairs.square_of_pairs(*n), divisor)
     total = _pairs.choice(obtuse, conjugate, _pairs.total(product, cosine))
     ratio = _pairs.ratio(total, v_length)
     return _pairs.rounded(total), _pairs.rounded(ratio), tuple(map(_pairs.rounded, n)), u_length, v_length
 
 
+def directions(a, b, a_length, b_length, total, n):
+    r"""$\hat b$, and $\hat a + \hat b$ as $(T\hat a + n \times \hat a)/(\|a\|\|b\|)$, which keeps its digits where they are nearly opposite."""
+    a, b = ([value / norm for value, _ in pair] for pair, norm in ((a, a_length), (b, b_length)))
+    product = a_length * b_length
+    return b, [(total * c + d) / product for c, d in zip(a, plain_cross(n, a), strict=True)]
+
+
 @lune_sum.defjvp
 def _lune_sum_jvp(primals, tangents):
-    r"""With $a = Au$, $b = Av$, $n = a \times b$: by a, of T, $\|b\| h$ with $h = \hat a + \hat b = (T\hat a + n \times \hat a)/(\|a\|\|b\|)$, whose
-    terms are perpendicular; by A, $h\,(\|b\| u + \|a\| v)^T$, in two words, as it cancels where $u \approx -v$. $T/\|b\|$ keeps, by b, only
-    what is perpendicular to it."""
+    r"""With $a = Au$, $b = Av$, $n = a \times b$: by a, of T, $\|b\| h$ with $h = \hat a + \hat b$ (`directions`); by A,
+    $h\,(\|b\| u + \|a\| v)^T$, in two words, as it cancels where $u \approx -v$. $T/\|b\|$ keeps, by b, only what is
+    perpendicular to it."""
     (au, av, A, u, v), (_, _, dA, du, dv) = primals, tangents
     total, ratio, n, a_length, b_length = lune_parts(au, av)
-    s = [weighted((x, b_length), (y, a_length)) for x, y in zip(u, v, strict=True)]
+    s = [_pairs.weighted((x, y), (b_length, a_length)) for x, y in zip(u, v, strict=True)]
     a_length, b_length = map(_pairs.rounded, (a_length, b_length))
     total, ratio, a_length, b_length, *rest = stable.one_loop(total, ratio, a_length, b_length, *n, *s)
     n, s = rest[:3], rest[3:]
-    a, b = ([value / norm for value, _ in pair] for pair, norm in ((au, a_length), (av, b_length)))
-    product = a_length * b_length
-    h = [(total * c + d) / product for c, d in zip(a, plain_cross(n, a), strict=True)]
+    b, h = directions(au, av, a_length, b_length, total, n)
     by_a, by_A = b_length * plain_dot(h, times(A, *du)), plain_dot(h, times(dA, *s))
     db = times(A, *dv)
     across = -plain_dot(plain_cross(n, b), db) / b_length
     by_total = by_a + by_A + across + ratio * plain_dot(b, db)
     return (total, ratio), (by_total, (by_a + by_A + across - ratio * plain_dot(b, times(dA, *v))) / b_length)
-
-
-def weighted(*terms):
-    """Sum of numbers times numbers in two words, rounded once."""
-    value, rest = _pairs.dot(tuple(x for x, _ in terms), tuple(weight for _, (weight, _) in terms))
-    return value + (rest + sum(x * low for x, (_, low) in terms))

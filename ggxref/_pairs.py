@@ -114,6 +114,12 @@ def inner(a: Pairs, b: Pairs) -> Pair:
     return value, rest + (a[0][0] * b[0][1] + a[1][0] * b[1][1] + a[2][0] * b[2][1])
 
 
+def weighted(weights: tuple[Scalar, ...], pairs: tuple[Pair, ...]) -> Scalar:
+    """The sum of the pairs, each times its weight, rounded once."""
+    value, rest = dot(weights, tuple(value for value, _ in pairs))
+    return value + (rest + sum(w * low for w, (_, low) in zip(weights, pairs, strict=True)))
+
+
 def times(A: Mat3, w: Triple) -> Pairs:
     """`A w`."""
     x, y, z = (dot(row, w) for row in rows(A))
@@ -136,8 +142,8 @@ def determinant(A: Mat3) -> Pair:
 def tangent_square(x: Scalar, y: Scalar, z: Scalar, ax: Scalar, ay: Scalar) -> Pair:
     r"""$(x^2/\alpha_x^2 + y^2/\alpha_y^2)/z^2$, `z > 0`: an exponent, whose error is one of its exponential times as large."""
     zero, z_square = jnp.zeros_like(z), dot((z,), (z,))
-    p, q = (over((c, zero), (a, zero), stable.reciprocal(a)) for c, a in ((x, ax), (y, ay)))
-    return over(square_of_pairs(p, q), z_square, stable.reciprocal(z_square[0]))
+    p, q = (ratio((c, zero), (a, zero)) for c, a in ((x, ax), (y, ay)))
+    return ratio(square_of_pairs(p, q), z_square)
 
 
 @tangent_square.defjvp

@@ -14,7 +14,7 @@ from jax.scipy.special import erfc
 from jaxtyping import Bool
 
 from ggxref import _pairs, _squares, stable
-from ggxref._lune_sum import lune_parts, weighted
+from ggxref._lune_sum import directions, lune_parts
 from ggxref._matrix import length, near_one, plain_cross, plain_dot, times
 from ggxref._pairs import Triple
 from ggxref._types import Mat3, Real, Scalar
@@ -96,9 +96,7 @@ def _area_by(w, A):
     (along, square), (total, _, n, a_length, b_length) = _beside_normal(w, A), lune_parts(a, b)
     a_length, b_length = _pairs.rounded(a_length), _pairs.rounded(b_length)
     total, a_length, b_length, longer, *n = stable.one_loop(total, a_length, b_length, 2 * z * along + square, *n)
-    a, b = ([value / norm for value, _ in c] for c, norm in ((a, a_length), (b, b_length)))
-    product = a_length * b_length
-    h = tuple((total * c + d) / product for c, d in zip(a, plain_cross(n, a), strict=True))
+    b, h = directions(a, b, a_length, b_length, total, n)
     more = longer / (b_length * (a_length + jnp.abs(z) * b_length))  # ‖a‖/‖b‖ − |z|
     aside = (2 * c / b_length**2 for c in plain_cross(b, n))  # 2 (‖a‖/‖b‖) (a's direction − c b's)
     upwards = (2 * total / b_length**2 * c for c in b)
@@ -111,7 +109,7 @@ def _beside_normal(w, A):
     x, y, _ = w
     d = [_pairs.rounded(_pairs.dot((row[0], row[1]), (x, y))) for row in A]
     along = (_pairs.dot(tuple(A[:, j]), tuple(A[:, 2])) for j in (0, 1))
-    return weighted(*zip((x, y), along, strict=True)), plain_dot(d, d)
+    return _pairs.weighted((x, y), tuple(along)), plain_dot(d, d)
 
 
 def ellipsoid_hides(w: Triple, A: Mat3) -> Bool[Array, ""]:

@@ -145,7 +145,7 @@ def _inverse_square_and_parts(wm, A):
     image = [(x * scale, rest * scale) for x, rest in (_pairs.dot_of_pairs(row, w) for row in minors)]
     x, y, z = (x for x, _ in image)
     d_square = _pairs.square_of_pairs((d, d_rest))
-    q, q_rest = _pairs.over(_pairs.square_of_pairs(*image), d_square, stable.reciprocal(d_square[0]))
+    q, q_rest = _pairs.ratio(_pairs.square_of_pairs(*image), d_square)
     longer = 2 * stable.excess(wm)
     square = jnp.where(longer > -1, 1 + longer, 1)  # ‖w‖², but for the zero vector
     q = q + (q_rest - q * (longer / square))

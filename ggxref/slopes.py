@@ -149,8 +149,8 @@ def student(x: Scalar, y: Scalar, z: Scalar, ax: Scalar, ay: Scalar, gamma: Scal
 def _student_logarithm(x, y, z, ax, ay, gamma):
     """ρ/(γ−1) and log(q/z²) in two words, and q with its rest as a share of it."""
     zero, g = jnp.zeros_like(z), gamma - 1
-    p = tuple(_pairs.over((c, zero), (a, zero), stable.reciprocal(a)) for c, a in ((x, ax), (y, ay)))
-    share = _pairs.over(_pairs.square_of_pairs(*p), (g, zero), stable.reciprocal(g))
+    p = tuple(_pairs.ratio((c, zero), (a, zero)) for c, a in ((x, ax), (y, ay)))
+    share = _pairs.ratio(_pairs.square_of_pairs(*p), (g, zero))
     return share, *_special.log1p_over_square(share, z)
 
 
@@ -167,8 +167,8 @@ def _by_gamma(x, y, z, ax, ay, gamma):
     rest, log, total = _student_logarithm(x, y, z, ax, ay, gamma)
     # In one pass: computed again for the value, and contracted otherwise there, the words would not belong together.
     a, b, c, d, q, low = stable.one_loop(*rest, *log, *total)
-    share = _pairs.over((a, b), (q, q * low), stable.reciprocal(q))
-    by_exponent = _pairs.over(share, (gamma - 1, jnp.zeros_like(q)), stable.reciprocal(gamma - 1))
+    share = _pairs.ratio((a, b), (q, q * low))
+    by_exponent = _pairs.ratio(share, (gamma - 1, jnp.zeros_like(q)))
     change = _pairs.rounded(_pairs.total(by_exponent, _pairs.less(share, (c, d))))
     beyond = jnp.where(q < jnp.inf, 1 / (gamma - 1) + 1 - c, 0)  # where h is 1; at infinity D is 0
     return jnp.where(q < 1e37, change, beyond)
@@ -227,7 +227,7 @@ def _tail(x, y, z, ax, ay):
     (top, top_rest), denominator, k = _special.half_ierfc(a, exponent)
     product, lost = two_product(s, top)
     numerator = product, lost + (s * top_rest + s_rest * top)
-    value, rest = _pairs.over(numerator, denominator, stable.reciprocal(denominator[0]))
+    value, rest = _pairs.ratio(numerator, denominator)
     return value + rest, k
 
 

@@ -66,12 +66,7 @@ def image(p: Pairs, A: Canonical) -> Triple:
     """`Aᵀ p`. Its height has the sign of p's, exactly."""
     c00, c10, c11, ex, ey = A
     x, _, z = p
-    return _component((c00, ex), (x, z)), _component((c10, c11, ey), p), _pairs.rounded(z)
-
-
-def _component(column: tuple[Scalar, ...], p: tuple[Pair, ...]) -> Scalar:
-    value, rest = _pairs.dot(column, tuple(hi for hi, _ in p))
-    return value + (rest + sum(c * low for c, (_, low) in zip(column, p, strict=True)))
+    return _pairs.weighted((c00, ex), (x, z)), _pairs.weighted((c10, c11, ey), p), _pairs.rounded(z)
 
 
 def from_sphere(p: Pairs, A: Canonical) -> Vec3:

@@ -214,14 +214,17 @@ def masking_g1_v_cavity(w, wm):
     return where(_front(w, wm), minimum(over(2.0 * abs(wm[2] * w[2]), abs(dot(w, wm))), 1.0), 0.0)
 
 
+def lune_sum(a, b):
+    """‖a‖‖b‖ + a·b."""
+    product, cosine, normal = norm(a) * norm(b), dot(a, b), cross(a, b)
+    below = cosine.hi < 0
+    return where(below, dot(normal, normal) / where(below, product - cosine, 1.0), product + cosine)
+
+
 def _sigma_ellipsoid(w, A):
     n = columns(A)[2]
     Aw = apply(A, w)
-    product, cosine = norm(Aw) * norm(n), dot(Aw, n)
-    normal = cross(Aw, n)
-    below = cosine.hi < 0
-    total = where(below, dot(normal, normal) / where(below, product - cosine, 1.0), product + cosine)
-    return total / (2.0 * dot(n, n))
+    return lune_sum(Aw, n) / (2.0 * dot(n, n))
 
 
 @stands_for("masking.g1_ellipsoid")
@@ -280,9 +283,13 @@ def fresnel_conductor(cos_i, eta, k):
     return s * (1.0 + over(straight - mixed, straight + mixed)) * 0.5
 
 
+def half(wi, wo):
+    return unit(plus(unit(wi), unit(wo)))
+
+
 @stands_for("bsdf.brdf_ggx")
 def bsdf_brdf_ggx(wi, wo, alpha):
-    wm, z_i, z_o = unit(plus(unit(wi), unit(wo))), unit(wi)[2], unit(wo)[2]
+    wm, z_i, z_o = half(wi, wo), unit(wi)[2], unit(wo)[2]
     seen = (z_i.hi > 0) & (z_o.hi > 0)
     G2 = masking_g2_height_correlated(masking_g1_ggx(wi, wm, alpha), masking_g1_ggx(wo, wm, alpha))
     return where(seen, ndf_ggx(wm, alpha) * G2 / where(seen, 4.0 * z_i * z_o, 1.0), 0.0)

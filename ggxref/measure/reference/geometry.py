@@ -4,9 +4,10 @@ from ggxref.measure.doubledouble import PI, sqrt, where
 from ggxref.measure.reference.formulas import (
     apply,
     cofactor,
-    cross,
     det,
     dot,
+    half,
+    lune_sum,
     norm,
     plus,
     scaled,
@@ -48,11 +49,7 @@ def ellipsoid_projected_area(w, A, size):
 @stands_for("ellipsoid.lune_area")
 def ellipsoid_lune_area(u, v, A, size):
     u, v = apply(A, unit(u)), apply(A, unit(v))
-    product, cosine = norm(u) * norm(v), dot(u, v)
-    normal = cross(u, v)
-    below = cosine.hi < 0
-    total = where(below, dot(normal, normal) / where(below, product - cosine, 1.0), product + cosine)
-    return PI * size * size * total / (2.0 * abs(det(A)) * norm(v))
+    return PI * size * size * lune_sum(u, v) / (2.0 * abs(det(A)) * norm(v))
 
 
 @stands_for("geometry.reflect")
@@ -63,7 +60,7 @@ def geometry_reflect(w, wm):
 
 @stands_for("geometry.half_reflection")
 def geometry_half_reflection(wi, wo):
-    return unit(plus(unit(wi), unit(wo)))
+    return half(wi, wo)
 
 
 @stands_for("geometry.refract")
