@@ -7,14 +7,14 @@ import os
 import sys
 from pathlib import Path
 
+from part import write_part
+
 from ggxref.errors import InputError
-from ggxref.files import write_atomically
 from ggxref.fit import fit, identification, read
 from ggxref.fit.fitting import Fit, Ladder
 
 FILES = ("merl/*.csv", "starlink/*.csv", "rgl/*.bsdf", "height/*")
 LEVELS = {"sample-land.x3p": 2}
-MARKS = "<!-- measured: experiments/fit_measured.py -->\n", "<!-- end measured -->\n"
 
 
 def shown(best: Fit) -> str:
@@ -70,9 +70,7 @@ def main(page: Path) -> None:
     for ladder in ladders:
         table.append(row(ladder))
         every += detail(ladder)
-    before, mark, rest = page.read_text(encoding="utf-8").partition(MARKS[0])
-    after = rest.partition(MARKS[1])[2]
-    write_atomically(page, before + mark + "\n".join([*table, "", *every]) + "\n" + MARKS[1] + after)
+    write_part(page, "measured: experiments/fit_measured.py", "\n".join([*table, "", *every, ""]))
 
 
 if __name__ == "__main__":

@@ -21,9 +21,8 @@ import scipy.stats
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 import fit_data
+from part import write_part
 
-from ggxref.errors import InputError
-from ggxref.files import write_atomically
 from ggxref.fit import models, objectives, parameters, selection, solver
 from ggxref.fit.data import Reflectance, Source, direction
 from ggxref.fit.fitting import Fit, fit_many
@@ -216,15 +215,7 @@ def main() -> None:
         print(line, flush=True)
         lines.append(line)
     if given.page:
-        write(given.page, given.part, lines)
-
-
-def write(page: Path, part: str, lines: list[str]) -> None:
-    begin, end = f"<!-- {part}: experiments/fit_recovery.py -->\n", f"<!-- end {part} -->\n"
-    before, mark, rest = page.read_text(encoding="utf-8").partition(begin)
-    if not mark:
-        raise InputError(f"{page} has no line {begin.strip()}")
-    write_atomically(page, before + begin + "\n".join(lines) + "\n" + end + rest.partition(end)[2])
+        write_part(given.page, f"{given.part}: experiments/fit_recovery.py", "\n".join([*lines, ""]))
 
 
 if __name__ == "__main__":

@@ -14,9 +14,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import jax.numpy as jnp
+from part import write_part
 
 from ggxref import masking, ndf, stable
-from ggxref.files import write_atomically
 from ggxref.measure import peers, speed
 from ggxref.measure.accuracy import arguments, measure
 from ggxref.measure.reference import REFERENCES
@@ -29,7 +29,6 @@ from ggxref.sampling._sphere import half_in_cap, ray
 
 PACKED, WIDE = "the same, packed in one array", "the same, vectors of 512 bits"
 DIFFERENTLY = {PACKED: {"apart": False}, WIDE: {"options": {"xla_cpu_prefer_vector_width": 512}}}
-MARKS = "<!-- kernels: experiments/kernels.py -->\n", "<!-- end kernels -->\n"
 SIZES = (1 << 16, 1 << 18, 1 << 20)
 POINTS = 1 << 15
 
@@ -108,13 +107,5 @@ def table() -> str:
     return "\n".join(lines) + "\n"
 
 
-def main(page: Path) -> None:
-    before, _, rest = page.read_text().partition(MARKS[0])
-    _, mark, after = rest.partition(MARKS[1])
-    if not mark:
-        raise SystemExit(f"{page}: wanted the marks {MARKS[0].strip()} and {MARKS[1].strip()}")
-    write_atomically(page, before + MARKS[0] + table() + MARKS[1] + after)
-
-
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    write_part(Path(sys.argv[1]), "kernels: experiments/kernels.py", table())

@@ -26,8 +26,8 @@ SETTINGS = (
 )
 
 
-def in_place(args):
-    """A subject whose result takes the place of the one before, which it is given and does not read."""
+def in_place(args, options=None):
+    """A subject whose result takes the place of the one before, which it is given and does not read; `options` are XLA's."""
     u, wi, alpha = args
     mapped = jax.vmap(spherical_cap.sample, (-1, -1, None), -1)
 
@@ -35,7 +35,7 @@ def in_place(args):
         return speed.components(mapped(jnp.stack(u), jnp.stack(wi), alpha))
 
     # Donated ω_i would be copied first: a loop of several results may not write where it reads.
-    program = jax.jit(run, donate_argnums=2, keep_unused=True)
+    program = jax.jit(run, donate_argnums=2, keep_unused=True, compiler_options=options)
     u, wi = speed.components(u), speed.components(wi)
     kept = [[jnp.zeros(POINTS, jnp.float32) for _ in range(3)]]
 

@@ -10,15 +10,14 @@ import sys
 from collections import Counter, defaultdict
 from pathlib import Path
 
-from ggxref.files import write_atomically
+from part import write_part
+
 from ggxref.golden import flags, invalid, text
 from ggxref.golden.diagnose import prediction
 from ggxref.golden.mistakes import MUTANTS
 from ggxref.golden.mutants import Mutant
 from ggxref.golden.reading import SHIPPED, Test, read
 from ggxref.golden.verdict import judge
-
-MARKS = "<!-- flags: begin -->", "<!-- flags: end -->"
 
 
 def kills(tests: list[Test]) -> dict[str, list[Test]]:
@@ -72,11 +71,9 @@ def main() -> None:
         for flag, sentence in (flags.SENTENCES | invalid.SENTENCES).items()
     ]
     table = "\n".join(
-        ["", "| flag | what it catches | tests | kills, among others | in test |", "|---|---|--:|---|---|", *rows, ""]
+        ["| flag | what it catches | tests | kills, among others | in test |", "|---|---|--:|---|---|", *rows, ""]
     )
-    before, _, rest = page.read_text().partition(MARKS[0])
-    _, _, after = rest.partition(MARKS[1])
-    write_atomically(page, before + MARKS[0] + table + MARKS[1] + after)
+    write_part(page, "flags: experiments/vectors_page.py", table)
 
 
 if __name__ == "__main__":

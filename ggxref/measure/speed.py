@@ -107,11 +107,11 @@ SETTLE = 0.01
 """Seconds: ten times the call that a kernel makes at 2^18 points."""
 
 
-def _turn(call: Callable[[], object]) -> float:
+def _turn(call: Callable[[], object], settle: float) -> float:
     """Seconds of a call, the median of a turn that lasts as long again as the subject had to settle."""
     taken: list[float] = []
-    settled = time.perf_counter() + SETTLE
-    while not taken or time.perf_counter() < settled + SETTLE:
+    settled = time.perf_counter() + settle
+    while not taken or time.perf_counter() < settled + settle:
         start = time.perf_counter()
         call()
         if start >= settled:
@@ -124,11 +124,12 @@ def interleaved(
     points: int,
     *,
     seconds: float = 2.0,
+    settle: float = SETTLE,
 ) -> list[Timing]:
     """Run all subjects in turns, again and again, for about `seconds` in all (at least 5 rounds).
 
-    A turn begins with calls that aren't timed, until `SETTLE` has passed: the threads of whoever ran before still spin, and
-    its own have gone to sleep. Each round has an order of its own.
+    A turn begins with calls that aren't timed, until `settle` seconds have passed: the threads of whoever ran before still
+    spin, and its own have gone to sleep. Each round has an order of its own.
     """
     for call in subjects.values():
         call()
@@ -137,7 +138,7 @@ def interleaved(
     end = time.perf_counter() + seconds
     while time.perf_counter() < end or len(next(iter(times.values()))) < 5:
         for name in rng.permutation(order).tolist():
-            times[name].append(_turn(subjects[name]) / points * 1e9)
+            times[name].append(_turn(subjects[name], settle) / points * 1e9)
     rows = []
     for name, t in times.items():
         lower, median, upper = np.quantile(t, [0.25, 0.5, 0.75])
