@@ -6,6 +6,7 @@ import shlex
 import signal
 import sys
 from collections.abc import Callable, Iterator
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from json import dumps
 from pathlib import Path
@@ -22,7 +23,7 @@ from ggxref.files import writable, writable_directory, write_atomically
 
 
 class _Verbs(TyperGroup):
-    """The verbs, with bad input turned into one line and exit code 2."""
+    """The verbs: of bad input one line and exit code 2, of a worker that was killed one line and exit code 1."""
 
     def invoke(self, ctx):
         try:
@@ -30,6 +31,12 @@ class _Verbs(TyperGroup):
         except InputError as error:
             print(f"ggxref: {error}", file=sys.stderr)
             raise typer.Exit(2) from None
+        except BrokenProcessPool:
+            print(
+                "ggxref: something ended a worker process; if it was for want of memory, a smaller --jobs needs less",
+                file=sys.stderr,
+            )
+            raise typer.Exit(1) from None
 
 
 app = typer.Typer(

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import time
 import warnings
 from collections.abc import Callable
@@ -175,6 +176,17 @@ def test_bad_input_is_named_on_one_line(arguments, words, tmp_path):
     result = CliRunner().invoke(app, ["chart", *(str(taken) if a == "FILE" else a for a in arguments)])
     assert result.exit_code == 2
     assert all(word in result.stderr for word in words)
+
+
+def test_a_killed_worker_is_told_on_one_line_and_what_was_finished_is_kept(tmp_path, monkeypatch):
+    finished, killed = {"a": _pieces(1024)["a"]}, dict.fromkeys("bc", partial(os._exit, 9))  # two: for two processes
+    monkeypatch.setitem(tables.KINDS, "stability", lambda points: finished)
+    run.collect("stability", tmp_path, 1024, 1, lambda n: None)
+    monkeypatch.setitem(tables.KINDS, "stability", lambda points: finished | killed)
+    result = CliRunner().invoke(app, ["chart", "stability", "--out", str(tmp_path), "--points", "1024", "--jobs", "2"])
+    assert result.exit_code == 1
+    assert "worker" in result.stderr and len(result.stderr.split("\n")) == 3  # behind the bar and its line
+    assert [path.name for path in tmp_path.rglob("*.*") if path.is_file()] == ["a.json"]
 
 
 def test_pieces_hold_json(tmp_path):
