@@ -1,13 +1,15 @@
 """Derivatives in float32 keep their digits wherever the inputs' rounding leaves them; a form that loses them is caught."""
 
+import itertools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from ggxref import bsdf, stable
-from ggxref.measure.accuracy import arguments
-from ggxref.measure.derivatives import measure, points, proof
+from ggxref.measure.accuracy import arguments, compiled
+from ggxref.measure.derivatives import blocks, half_ulp, jacobian, measure, points, proof, worst_corner
 from ggxref.measure.regions import rounded
 from ggxref.measure.tables import DRAWS, library
 from ggxref.sampling import slope_beckmann
@@ -60,6 +62,29 @@ def plain_stretch(w, factors):
 )
 def test_a_derivative_that_cancels_is_caught(name, plain):
     assert measure(name, plain, arguments(plain), "smooth", COUNT, library(name)).worst > 5 * LIMIT
+
+
+def test_the_worst_corner_is_that_of_all_corners():
+    """Of a quadratic form, whose derivative is linear: of 2⁵ corners, four drawn at random move it by half as much."""
+    rng = np.random.default_rng(11)
+    form = rng.normal(size=(5, 5))
+
+    def quadratic(wi, u):
+        x = jnp.concatenate([wi, u])
+        return x @ jnp.asarray(form) @ x / 2
+
+    args = [rng.normal(size=(3, 16)).astype(np.float32), rng.normal(size=(2, 16)).astype(np.float32)]
+    cut, which = blocks(("wi", "u"), args), np.array([3, 0, 15])
+    found = worst_corner(compiled(jacobian(quadratic)), args, which, cut)
+    steps = np.concatenate([half_ulp(a) for a in args])[:, which]
+    signs = np.array(list(itertools.product([-1, 1], repeat=5)))
+    changes = np.einsum("cj,rj,jp->crp", signs, (form + form.T) / 2, steps)
+    for block, rows in zip(found, (slice(0, 3), slice(3, 5)), strict=True):
+        # The corner that moves one number the farthest moves the block nearly so: at most by √rows less.
+        largest = np.sqrt((changes[:, rows] ** 2).sum(1)).max(0)
+        assert np.all(block <= largest * (1 + 1e-6)) and np.all(
+            block >= np.abs(changes[:, rows]).max((0, 1)) * (1 - 1e-6)
+        )
 
 
 @pytest.mark.parametrize("wide", [False, True], ids=["float32", "float64"])

@@ -21,6 +21,7 @@ from ggxref.oracle.precision import exact, lookup, raised
 
 WELL = 1e-5  # a block that the inputs' ±1/2-ulp box moves by more is ill-conditioned
 CORNERS = 4  # of that box, drawn at random
+SUSPECTS = 64  # points of a batch, the worst, whose worst corner is looked for
 FLOOR = 1e-30  # below, a value or components of a float32 block may be flushed
 BLOCK = 1 << 14
 
@@ -107,6 +108,27 @@ def half_ulp(x: np.ndarray) -> np.ndarray:
     return np.where(x == 0, 0, np.ldexp(1.0, np.frexp(x)[1] - np.finfo(x.dtype).nmant - 2))
 
 
+def worst_corner(truth: Callable, args, which: np.ndarray, cut: dict[str, slice]) -> np.ndarray:
+    """How far a corner of the inputs' ±1/2-ulp box moves each block at the points `which`, to first order: (blocks, which).
+
+    Of the corners, those that move a number of the block the farthest.
+    """
+    total, each = args[0].shape[-1], len(which)
+    flat = [a.reshape(-1, total)[:, which] for a in args]
+    numbers, steps = np.concatenate(flat).astype(np.float64), np.concatenate([half_ulp(a) for a in flat])
+    moved = numbers[:, None] + np.eye(len(numbers), len(numbers) + 1)[:, :, None] * steps[:, None]  # the last is not
+    moved = np.pad(moved.reshape(len(numbers), -1), ((0, 0), (0, max(0, total - moved[0].size))), "edge")
+    ends = np.cumsum([len(f) for f in flat])[:-1]
+    jacobians = truth(*(part.reshape(*a.shape[:-1], -1) for part, a in zip(np.split(moved, ends), args, strict=True)))
+    found = []
+    for s in cut.values():
+        part = jacobians[:, s, : (len(numbers) + 1) * each].reshape(-1, len(numbers) + 1, each)
+        changes = part[:, :-1] - part[:, -1:]
+        corners = np.einsum("cmp,dmp->cdp", np.sign(changes), changes)
+        found.append(np.sqrt((corners**2).sum(1)).max(0))
+    return np.stack(found)
+
+
 def errors(run: Callable, truth: Callable, args, cut: dict[str, slice], rng: np.random.Generator):
     """Of each block at each point: relative error, −1 where it is not graded, and whether it is ill-conditioned; then
     whether, where the value is finite, a derivative or a number of the reference is not.
@@ -122,6 +144,9 @@ def errors(run: Callable, truth: Callable, args, cut: dict[str, slice], rng: np.
         error = _norms(computed - exactly, cut) / size
         value = np.abs(exactly[:, 0]).max(0)
         seen = (size > FLOOR) & (size < float(np.finfo(args[0].dtype).max)) & ((value > FLOOR) | (value == 0))
+        graded = np.where(change <= WELL * size, error, -1).max(0)
+        which = np.argsort(graded)[: -min(SUSPECTS, len(graded)) - 1 : -1]
+        change[:, which] = np.maximum(change[:, which], worst_corner(truth, args, which, cut))
         ill = seen & ~(change <= WELL * size)
     finite = np.isfinite(computed)
     fault = finite[:, 0].all(0) & ~(finite & np.isfinite(exactly)).all((0, 1))
