@@ -12,7 +12,7 @@ from ggxref.measure.accuracy import arguments, compiled
 from ggxref.measure.derivatives import blocks, half_ulp, jacobian, measure, points, proof, worst_corner
 from ggxref.measure.regions import rounded
 from ggxref.measure.tables import DRAWS, library
-from ggxref.sampling import slope_beckmann
+from ggxref.sampling import lune, slope_beckmann
 
 COUNT = 512
 LIMIT = 1e-4
@@ -105,6 +105,25 @@ def test_samples_of_smooth_skewed_ellipsoids_turn_by_little(sampler):
     """A change of the half vector's height moves `Aᵀ` of it by |e|, along the micronormal, and turns that by α: 2e-4 if not left out."""
     name = f"sampling.{sampler}.sample"
     assert measure(name, library(name), ("u", "wi", "A"), "smooth", 4096).worst < 5e-5
+
+
+@pytest.mark.parametrize("name", ["sample_rejection_sphere", "sample_rejection_ellipsoid"])
+def test_accepted_samples_of_smooth_ellipsoids_turn_by_little(name):
+    """As above: by u and by ω_i, 2e-4 and more if not left out."""
+    name = f"sampling.lune.{name}"
+    found = measure(name, library(name), ("rows", "wi", "A"), "smooth", 4096)
+    assert found.worst < 5e-5 and found.not_finite == 0, found
+
+
+@pytest.mark.parametrize("alpha", [1e-11, 1e-12])
+def test_bounding_sphere_of_extreme_ellipsoids_has_derivatives(alpha):
+    """The determinant's square, a divisor of its derivative, left the range: NaN before."""
+    A = jnp.asarray([[alpha, -alpha / 3, 0], [0, alpha / 2, 0], [0.2, -0.3, 1]], jnp.float32)
+    u = np.random.default_rng(8).random((64, 4, 2)).astype(np.float32)
+    wi = jnp.asarray([0.6, 0.0, 0.8], jnp.float32)
+    by_all = jax.jacrev(lambda *args: lune.sample_rejection_sphere(*args)[0], (0, 1, 2))
+    found = jax.jit(jax.vmap(by_all, (0, None, None)))(u, wi, A)
+    assert all(np.isfinite(slopes).all() for slopes in found)
 
 
 def test_a_lost_term_is_caught_by_the_oracle():

@@ -6,7 +6,7 @@ from jaxtyping import Array, Float, Int
 
 from ggxref import _special, stable
 from ggxref._canonical import canonical_frame
-from ggxref._matrix import length, near_one, times
+from ggxref._matrix import length, near_one, plain_cross, reciprocal_scale, times
 from ggxref._types import Mat3, Scalar, Vec2, Vec3
 from ggxref.ellipsoid import cofactor
 from ggxref.geometry import basis
@@ -51,6 +51,29 @@ def _disk(u):
     return r * cos_phi, r * sin_phi
 
 
+def _plainly_along(M, x):
+    # What cancels is computed once: contracted to FMAs here and not there, it would not have the length that is divided by.
+    return jnp.stack(stable.unit(*stable.one_loop(*times(M, *x))))
+
+
+@jax.custom_jvp
+def _along(M: Mat3, cof: Mat3, x: Vec3) -> Vec3:
+    """The unit vector along `M x`. `cof`: M's cofactor matrix.
+
+    Of M dx, a smooth ellipsoid leaves most along M x: what turns it is left by M x × M dx = cof (x × dx) alone.
+    """
+    return _plainly_along(M, x)
+
+
+@_along.defjvp
+def _along_jvp(primals, tangents):
+    (M, cof, x), (dM, _, dx) = primals, tangents
+    value, change = jax.jvp(lambda M: _plainly_along(M, x), (M,), (dM,))
+    size = length(*times(M, *x))
+    turn = jnp.stack(times(cof, *plain_cross(x, dx))) / size
+    return value, change + jnp.stack(plain_cross(turn, value)) / size
+
+
 @stable.widened
 def sample_rejection_ellipsoid(u: Tries, wi: Vec3, A: Mat3) -> tuple[Vec3, Int[Array, ""]]:
     """Version 2: points of the ellipsoid's own silhouette until one lies on the lune.
@@ -62,13 +85,13 @@ def sample_rejection_ellipsoid(u: Tries, wi: Vec3, A: Mat3) -> tuple[Vec3, Int[A
     walter2014 §4, version 2. Disk point: `r = sqrt(u[1])`, turned by `u[0]` in the frame `geometry.basis(A wi)`.
     """
     A, _ = near_one(A)
-    e3 = jnp.stack(stable.unit(*times(A, *wi)))
+    cof, _ = cofactor(A)
+    e3 = _along(A, cof, wi)
     t, b, _ = basis(e3)
 
     def attempt(u):
         x, y = _disk(u)
-        # What cancels is computed once: contracted to FMAs here and not there, it would not have the length that is divided by.
-        m = jnp.stack(stable.unit(*stable.one_loop(*times(A.T, *(x * t + y * b + stable.sqrt(1 - u[1]) * e3)))))
+        m = _along(A.T, cof.T, x * t + y * b + stable.sqrt(1 - u[1]) * e3)
         return m[2] > 0, m
 
     return _first(*jax.vmap(attempt)(u))
@@ -120,24 +143,21 @@ def sample_rejection_sphere(u: Tries, wi: Vec3, A: Mat3) -> tuple[Vec3, Int[Arra
     A, _ = near_one(A)
     cof, det = cofactor(A)
     # The longest half axis: the largest singular value of A^{-T}, which has more digits than the smallest of A.
-    radius = _largest_singular(cof) / jnp.abs(det)
+    scale = reciprocal_scale(jnp.abs(cof).max())
+    radius = _largest_singular(cof * scale) / jnp.abs(det * scale)
     t, b, _ = basis(wi)
-    a = times(A, *wi)
-    a_square = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
-    # The ray hits the sphere-space sphere at q + sqrt(1 - q²) a/|a|, where q, its point nearest to the centre, is
-    # (a × A d) × a / a² for any point d of the ray. a × A d = cof(A) (ωi × d) leaves out the long way along a.
-    by_x, by_y = times(cof, *(radius * b)), times(cof, *(radius * t))
+    e3 = _along(A, cof, wi)
+    # The ray hits the sphere-space sphere at q + sqrt(1 - q²) e3, where q, its point nearest to the centre, is
+    # (A ωi × A d) × e3 / |A ωi| for any point d of the ray. A ωi × A d = cof(A) (ωi × d) leaves out the long way along e3.
+    reach = cof / length(*times(A, *wi))
+    by_x, by_y = times(reach, *(radius * b)), times(reach, *(radius * t))
 
     def attempt(u):
         x, y = _disk(u)
         moment = tuple(x * p - y * q for p, q in zip(by_x, by_y, strict=True))
-        miss = (moment[0] * moment[0] + moment[1] * moment[1] + moment[2] * moment[2]) / a_square
-        rise = stable.sqrt((1 - miss) / a_square)
-        p = (
-            (moment[j] * a[k] - moment[k] * a[j]) / a_square + rise * a[i]
-            for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
-        )
-        m = jnp.stack(stable.unit(*stable.one_loop(*times(A.T, *p))))
+        miss = moment[0] * moment[0] + moment[1] * moment[1] + moment[2] * moment[2]
+        p = jnp.stack(plain_cross(moment, e3)) + stable.sqrt(1 - miss) * e3
+        m = _along(A.T, cof.T, p)
         return (miss <= 1) & (m[2] > 0), m
 
     return _first(*jax.vmap(attempt)(u))
