@@ -1,8 +1,8 @@
 r"""Quotients $\omega\cdot m / \sigma(\omega)$, the heart of G1 and of every visible density, with derivatives that do not cancel.
 
-With $s = \|(\alpha_x x, \alpha_y y)\|$, $\sigma = z\,\partial_z\sigma + s\,\partial_s\sigma$. Near normal incidence on a smooth surface
-σ is nearly z, the quotient hardly depends on ω, and the two terms of the quotient rule for z cancel down to
-$(m_z\,s\,\partial_s\sigma - (x m_x + y m_y)\,\partial_z\sigma)/\sigma^2$. The cosine comes from outside, in as many digits as it needs.
+Where the quotient hardly depends on ω, as near normal incidence on a smooth surface, where σ is nearly z, the two terms of the
+quotient rule cancel. As $\sigma = \omega\cdot\nabla\sigma$, what they leave is $\omega\times(m\times\nabla\sigma)/\sigma^2$. The cosine comes from
+outside, in as many digits as it needs.
 """
 
 import math
@@ -57,7 +57,7 @@ def _over_ggx_jvp(primals, tangents):
     by_z = jnp.where(w[2] < 0, area / t, w[2] / t + k)
     by_z = jnp.where(area < jnp.inf, by_z, 0)
     quotient = cosine / area
-    change = _change(primals, tangents, quotient, area, by_z, 1 / t, square / t)
+    change = _change(primals, tangents, quotient, area, by_z, 1 / t)
     return quotient, change - quotient * w[2] / area * tangents[3]
 
 
@@ -135,13 +135,13 @@ def _over_beckmann_jvp(primals, tangents):
     by_s = jnp.exp(-a * a) / (2 * math.sqrt(math.pi))
     area = _unless_underflown(sigma)
     quotient = cosine / area
-    return quotient, _change(primals, tangents, quotient, area, erfc(-a) / 2, by_s / s, s * by_s)
+    return quotient, _change(primals, tangents, quotient, area, erfc(-a) / 2, by_s / s)
 
 
-def _change(primals, tangents, quotient, area, by_z, by_square, s_by_s):
-    """Of the quotient; `by_square` is the area's derivative by s²/2."""
-    ((x, y, z), (p, q, r), (ax, ay), *_), ((dx, dy, dz), (dp, dq, dr), (dax, day), *_) = primals, tangents
-    turned = p * dx + q * dy + x * dp + y * dq + z * dr
-    along = (r * (s_by_s / area) - (x * p + y * q) * (by_z / area)) * dz
-    half_square = ax * x * (ax * dx + x * dax) + ay * y * (ay * dy + y * day)
-    return (turned + along - quotient * (by_square * half_square)) / area
+def _change(primals, tangents, quotient, area, by_z, by_square):
+    """Of the quotient; `by_square` is the area's derivative by s²/2. By ω as that of an ellipsoid."""
+    (w, m, (ax, ay), *_), (dw, dm, (dax, day), *_) = primals, tangents
+    across = ax * w[0] * by_square, ay * w[1] * by_square
+    by_w = plain_dot(plain_cross(m, (ax * across[0], ay * across[1], by_z)), plain_cross(dw, w)) / area
+    by_alpha = across[0] * w[0] * dax + across[1] * w[1] * day
+    return (by_w + plain_dot(w, dm) - quotient * by_alpha) / area
