@@ -35,6 +35,7 @@ TWICE = {
     "masking.g1_ggx": "typical smooth",
     "masking.g2_height_correlated": "typical",
     "bsdf.brdf_ggx": "typical smooth",
+    "sampling.cross_section.sample": "typical anisotropic",
 }
 ONCE = {
     "ellipsoid.lune_area": "typical skew smooth",

@@ -115,6 +115,12 @@ def test_accepted_samples_of_smooth_ellipsoids_turn_by_little(name):
     assert found.worst < 5e-5 and found.not_finite == 0, found
 
 
+def test_samples_beside_the_azimuth_of_the_larger_roughness():
+    """By alpha, what turns them is the cube of a sine: 1.6e-4 as a difference."""
+    name = "sampling.cross_section.sample"
+    assert measure(name, library(name), ("u", "wi", "alpha"), "ordinals", 4096).worst < 5e-5
+
+
 @pytest.mark.parametrize("alpha", [1e-11, 1e-12])
 def test_bounding_sphere_of_extreme_ellipsoids_has_derivatives(alpha):
     """The determinant's square, a divisor of its derivative, left the range: NaN before."""
