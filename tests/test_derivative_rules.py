@@ -36,6 +36,7 @@ TWICE = {
     "masking.g2_height_correlated": "typical",
     "bsdf.brdf_ggx": "typical smooth",
     "sampling.cross_section.sample": "typical anisotropic",
+    "sampling.ellipsoid_bounded.bound": "typical skew smooth",
 }
 ONCE = {
     "ellipsoid.lune_area": "typical skew smooth",

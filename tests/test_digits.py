@@ -12,9 +12,10 @@ from flint import arb, ctx
 from ggxref import _kepler, bsdf, ndf, slopes, stable
 from ggxref._canonical import canonical_frame, canonical_terms
 from ggxref.ellipsoid import canonical
-from ggxref.measure.accuracy import measure
+from ggxref.measure.accuracy import compiled, measure
+from ggxref.measure.derivatives import half_ulp, jacobian, points
 from ggxref.measure.reference import REFERENCES
-from ggxref.measure.regions import skewed
+from ggxref.measure.regions import rounded, skewed
 from ggxref.measure.tables import DRAWS, library
 from ggxref.measure.variants.brdf import plain_sum
 from ggxref.measure.variants.densities import fresnel_plain_root
@@ -262,3 +263,28 @@ def test_what_is_canonical_stays_as_it_is(x64):
         form = jax.jit(jax.vmap(canonical, -1, -1))
         once = form(turned_matrices(4096).astype(float))
         assert (form(once) == once).all()
+
+
+def plain_bound(wi, A):
+    """The bound of the bounded ellipsoid cap with its sum in one word."""
+    terms = canonical_terms(A)
+    i, (c_square, q) = A @ wi, ellipsoid_bounded._largest_q(wi, terms)
+    return -(terms.ex * wi[0] + terms.ey * wi[1] + wi[2] * (q / (c_square + q))) / jnp.sqrt(i @ i)
+
+
+def beyond_inputs(function, region):
+    """Largest error of a bound beyond what half an ulp of its inputs explains, in ulps; by float64."""
+    drawn = rounded(points(region, np.random.default_rng(12), COUNT), np.float32)
+    args = drawn["wi"], drawn["A"]
+    wide = [a.astype(np.float64) for a in args]
+    exactly = compiled(jacobian(ellipsoid_bounded.bound))(*wide)[0]
+    steps = np.concatenate([half_ulp(a).reshape(-1, COUNT) for a in args])
+    error = np.abs(compiled(function)(*args) - exactly[0]) - (np.abs(exactly[1:]) * steps).sum(0)
+    return np.max(error / (2 * half_ulp(exactly[0].astype(np.float32))))
+
+
+def test_bound_of_the_ellipsoid_where_its_sum_cancels():
+    """e·ωi against i_z (1 − 1/max Q), where the mean slope faces away: hundreds of ulps of the inputs, and one of its own."""
+    for region in ("smooth", "skew"):
+        assert beyond_inputs(ellipsoid_bounded.bound, region) < 2
+        assert beyond_inputs(plain_bound, region) > 5

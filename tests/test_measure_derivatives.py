@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from ggxref import bsdf, stable
+from ggxref._canonical import canonical_terms
 from ggxref.measure.accuracy import arguments, compiled
 from ggxref.measure.derivatives import blocks, half_ulp, jacobian, measure, points, proof, worst_corner
 from ggxref.measure.regions import rounded
 from ggxref.measure.tables import DRAWS, library
-from ggxref.sampling import lune, slope_beckmann
+from ggxref.sampling import ellipsoid_bounded, lune, slope_beckmann
 
 COUNT = 512
 LIMIT = 1e-4
@@ -130,6 +131,21 @@ def test_bounding_sphere_of_extreme_ellipsoids_has_derivatives(alpha):
     by_all = jax.jacrev(lambda *args: lune.sample_rejection_sphere(*args)[0], (0, 1, 2))
     found = jax.jit(jax.vmap(by_all, (0, None, None)))(u, wi, A)
     assert all(np.isfinite(slopes).all() for slopes in found)
+
+
+def plain_bound(wi, A):
+    """The bound as it is defined, of a canonical `A`, by autodiff."""
+    i = A @ wi
+    c_square, q = ellipsoid_bounded._largest_q(wi, canonical_terms(A))
+    return (wi[2] * c_square / (c_square + q) - i[2]) / jnp.sqrt(i @ i)
+
+
+def test_the_bound_of_a_smooth_ellipsoid_keeps_its_small_derivative():
+    """It is nearly -1, and its derivative of the order of α²: what autodiff gives are multiples of 2⁻²³."""
+    name = "sampling.ellipsoid_bounded.bound"
+    for region in ("smooth", "skew"):
+        assert measure(name, library(name), ("wi", "A"), region, 4096).worst < 2e-5
+    assert measure(name, plain_bound, ("wi", "A"), "smooth", COUNT, library(name)).worst > 1
 
 
 def test_a_lost_term_is_caught_by_the_oracle():

@@ -6,11 +6,13 @@ inclination θ $\|A^{-T}m\|^2 \le Q(\theta) = \cos^2\theta + (\sin\theta + \|e\|
 $o_z' + i_z' \ge i_z/(\|A i\| \max_{\theta\le\theta_1} Q)$. At e = 0 and α ≤ 1 this is tokuyoshi2024's bound.
 """
 
+import jax
 import jax.numpy as jnp
 
 from ggxref import _pairs, ndf, stable
 from ggxref._canonical import Canonical, canonical_terms
-from ggxref._matrix import length, near_one, normal_square
+from ggxref._errorfree import two_sum
+from ggxref._matrix import length, length_of_pairs, near_one, normal_square
 from ggxref._pairs import Triple
 from ggxref._seen import area_ggx
 from ggxref._types import Mat3, Scalar, Turn, Vec2, Vec3
@@ -56,12 +58,40 @@ def bound(wi: Vec3, A: Mat3) -> Scalar:
 
     - `wi`: unit, (3,). `A`: shape matrix, (3, 3), non-singular.
     """
-    terms = canonical_terms(A)
-    i = _rounded_to_sphere(wi, terms)
-    c_square, q = _largest_q(wi, terms)
-    # i_z/(‖Aωi‖ Q) − i'_z with i'_z = (e·ωi + i_z)/‖Aωi‖.
-    fall = terms.ex * wi[0] + terms.ey * wi[1] + wi[2] * (q / (c_square + q))
-    return -jnp.where(wi[2] > 0, fall, i[2]) / length(*i)
+    return _bound(wi, canonical_terms(A))
+
+
+@jax.custom_jvp
+def _bound(wi: Vec3, A: Canonical) -> Scalar:
+    r"""$-(e\cdot\omega_i + i_z (1 - r))/\|A\omega_i\|$, $r = 1/\max Q$: the sum cancels where the mean slope faces away."""
+    x, y, z = wi
+    zero = jnp.zeros_like(z)
+    c_square, q = stable.one_loop(*_largest_q(wi, A))
+    rest = _pairs.choice(z > 0, _pairs.ratio((q, zero), two_sum(c_square, q)), (jnp.ones_like(z), zero))
+    fall = _pairs.total(_pairs.dot((A.ex, A.ey), (x, y)), _pairs.product((z, zero), rest))
+    return -_pairs.rounded(_pairs.ratio(fall, length_of_pairs(to_sphere(wi, A))))
+
+
+@_bound.defjvp
+def _bound_jvp(primals, tangents):
+    r"""Of $(z r - h)/N$, $h = e\cdot\omega_i + z$ and $N^2 = \|a\|^2 + h^2$, without the terms that cancel: of smooth surfaces it is of
+    the order of ‖a‖², a = C (x, y). Below, `a`, `b`, `h` and `skew` are in units of N.
+    """
+    (wi, A), (dwi, dA) = primals, tangents
+    (x, y, z), (dx, dy, dz), up = wi, dwi, wi[2] > 0
+    (c_square, q), (dc_square, dq) = jax.jvp(_largest_q, primals, tangents)
+    skew, *sphere = map(_pairs.rounded, (_pairs.dot((A.ex, A.ey), (x, y)), *to_sphere(wi, A)))
+    r, rest = jnp.where(up, c_square / (c_square + q), 0), jnp.where(up, q / (c_square + q), 1)
+    N = length(*sphere)
+    skew, a, b, h = (c / N for c in (skew, *sphere))
+    value, square = _bound(wi, A), a * a + b * b
+    by_z, by_skew = r * h * skew - square * rest, square + r * h * (z / N)
+    by_r = jnp.where(up, z / (c_square + q), 0)
+    by_z, by_skew, rest, r, by_r, a, b, N = stable.one_loop(by_z, by_skew, rest, r, by_r, value * a, value * b, 1 / N)
+    da, db = A.c00 * dx + dA.c00 * x + A.c10 * dy + dA.c10 * y, A.c11 * dy + dA.c11 * y
+    dskew = A.ex * dx + dA.ex * x + A.ey * dy + dA.ey * y
+    change = by_z * dz + by_r * (rest * dc_square - r * dq) - by_skew * dskew - (a * da + b * db)
+    return value, change * N
 
 
 @stable.widened
