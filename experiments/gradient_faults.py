@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from rich.progress import track
 
-from ggxref import slopes
+from ggxref import ndf, slopes
 from ggxref.measure.accuracy import arguments
 from ggxref.measure.derivatives import Derivative, measure, proof
 from ggxref.measure.regions import REGIONS
@@ -52,6 +52,7 @@ TAKEN = DRAWS | {
     "sampling.lune.sample_rejection_sphere": ("rows", "wi", "A"),
     "sampling.lune.sample_rejection_ellipsoid": ("rows", "wi", "A"),
 }
+ONE = jnp.ones(2)
 # A gradient this far from the exact one is wrong.
 LIMIT = 1e-4
 
@@ -64,7 +65,9 @@ def subject(name: str):
     if name in OPTIONS:
         function = partial(function, **OPTIONS[name])
     if name.startswith("sampling.table"):
-        function = partial(function, table=table.build(partial(slopes.ggx, alpha=jnp.ones(2)), size=64))
+        function = partial(
+            function, table=table.build(partial(slopes.ggx, alpha=ONE), size=64, normals=partial(ndf.ggx, alpha=ONE))
+        )
     return function, TAKEN.get(public, arguments(function))
 
 

@@ -57,7 +57,7 @@ def _over_ggx_jvp(primals, tangents):
     by_z = jnp.where(w[2] < 0, area / t, w[2] / t + k)
     by_z = jnp.where(area < jnp.inf, by_z, 0)
     quotient = cosine / area
-    change = _change(primals, tangents, quotient, area, by_z, 1 / t)
+    change = turned_by(primals, tangents, quotient, area, by_z, 1 / t)
     return quotient, change - quotient * w[2] / area * tangents[3]
 
 
@@ -135,10 +135,10 @@ def _over_beckmann_jvp(primals, tangents):
     by_s = jnp.exp(-a * a) / (2 * math.sqrt(math.pi))
     area = _unless_underflown(sigma)
     quotient = cosine / area
-    return quotient, _change(primals, tangents, quotient, area, erfc(-a) / 2, by_s / s)
+    return quotient, turned_by(primals, tangents, quotient, area, erfc(-a) / 2, by_s / s)
 
 
-def _change(primals, tangents, quotient, area, by_z, by_square):
+def turned_by(primals, tangents, quotient, area, by_z, by_square):
     """Of the quotient; `by_square` is the area's derivative by s²/2. By ω as that of an ellipsoid."""
     (w, m, (ax, ay), *_), (dw, dm, (dax, day), *_) = primals, tangents
     across = ax * w[0] * by_square, ay * w[1] * by_square

@@ -1,14 +1,17 @@
 """The tables against the exact inversions where those exist, and against the density where they do not."""
 
+from dataclasses import replace
 from functools import partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax.test_util import check_grads
 from scipy import stats
 
-from ggxref import slopes
+from ggxref import ndf, slopes
+from ggxref.measure.derivatives import measure
 from ggxref.sampling import slope_beckmann, slope_ggx, table
 
 ONE = jnp.ones(2, jnp.float32)
@@ -84,3 +87,43 @@ def test_student_t_follows_its_density():
     # One fixed seed and one test: 1e-4 is one wrong alarm in 10⁴ changes of the seed.
     assert stats.kstest(uniform, "uniform").pvalue > 1e-4
     assert stats.kstest(uniform**1.03, "uniform").pvalue < 1e-4  # the power to see 3 % of an exponent
+
+
+@pytest.fixture(scope="module")
+def small():
+    """Without and with the density of the normals."""
+    density, normals = partial(slopes.ggx, alpha=ONE), partial(ndf.ggx, alpha=ONE)
+    return table.build(density, size=64), table.build(density, size=64, normals=normals)
+
+
+def test_density_by_normals_is_that_by_slopes(small):
+    wi = direction(1.2)
+    wm = EXACT_SAMPLE["ggx"](draw(1 << 10), wi, ALPHA)
+    np.testing.assert_allclose(*(TABLE_PDF(wm, wi, ALPHA, t) for t in small), rtol=2e-6)
+
+
+def test_derivatives_of_the_density_keep_four_digits(small):
+    """By grazing ω_m only with the density of the normals: that of the slopes has a derivative that underflows."""
+
+    def worst(t, region):
+        return measure("table.pdf", partial(table.pdf, table=t), ("wm", "wi", "alpha"), region, 4096).worst
+
+    by_slopes, by_normals = small
+    for region in ("grazing", "smooth", "near_normal", "ordinals"):
+        assert worst(by_normals, region) < 5e-5
+    assert worst(by_slopes, "grazing") > 1
+
+
+@pytest.mark.parametrize("theta", [0.3, 1.2])
+def test_derivatives_of_the_density_are_difference_quotients(small, theta):
+    """The first and the second, by the table of σ too."""
+    by_normals = small[1]
+
+    def density(wm, wi, alpha, sigma):
+        wm, wi = (w / jnp.sqrt(w @ w) for w in (wm, wi))
+        return table.pdf(wm, wi, alpha, replace(by_normals, sigma=sigma))
+
+    with jax.enable_x64(True):
+        args = jnp.asarray([0.28, 0.0, 0.96]), direction(theta), ALPHA, by_normals.sigma
+        args = tuple(np.asarray(a, np.float64) for a in args)
+        check_grads(jax.jit(density), args, order=2, rtol=1e-5)

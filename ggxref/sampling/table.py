@@ -15,8 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from ggxref import stable
-from ggxref._matrix import length
+from ggxref import _squares, stable
+from ggxref._seen import turned_by
 from ggxref._types import Scalar, Vec2, Vec3
 from ggxref.sampling._sphere import incident, unstretch
 
@@ -30,6 +30,7 @@ class Table:
     phi: Array  # angle of the slope across, by (ψ in [-π/2, π/2], column of u1)
     sigma: Array  # projected area of the visible microsurface, by θi
     density: Callable[[Vec2], Scalar] = field(metadata={"static": True})
+    normals: Callable[[Vec3], Scalar] | None = field(default=None, metadata={"static": True})  # D at α = 1
 
     @property
     def nbytes(self) -> int:
@@ -55,12 +56,16 @@ def _angles(cells):
     return edges, (edges[:-1, None] + nodes * (math.pi / cells)).ravel()
 
 
-def build(density: Callable[[Vec2], Scalar], *, size: int = 1024) -> Table:
+def build(
+    density: Callable[[Vec2], Scalar], *, size: int = 1024, normals: Callable[[Vec3], Scalar] | None = None
+) -> Table:
     r"""Tables for the slope density P22 at α = 1: `size`² numbers each, float32.
 
     - `density`: isotropic and normalised, from a slope (2,) to a value (); for instance
       `partial(slopes.student_t, alpha=jnp.ones(2), gamma=4.0)`. Its tails may fall no slower than GGX's.
     - `size`: at least 2. The paper's is 1024, 8 MB for both.
+    - `normals`: the same at α = 1 as a density of micronormals (3,), D; for instance `partial(ndf.ggx, alpha=jnp.ones(2))`. Derivatives
+      of `pdf` by grazing ω_m need it: of $P^{22}/z_m^4$ they are differences that cancel, and of P22 alone they underflow.
 
     heitz2014 (10)–(13) and §5.3.
     """
@@ -94,7 +99,7 @@ def build(density: Callable[[Vec2], Scalar], *, size: int = 1024) -> Table:
         for row, running in zip(block, across, strict=True):
             phi[row] = np.interp(coarse * running[-1], running, edges)
     single = (jnp.asarray(a, jnp.float32) for a in (psi, phi, sigma))
-    return Table(*single, density=density)
+    return Table(*single, density=density, normals=normals)
 
 
 def _bilinear(table: Array, row: Scalar, column: Scalar) -> Scalar:
@@ -143,14 +148,48 @@ def pdf(wm: Vec3, wi: Vec3, alpha: Vec2, table: Table) -> Scalar:
 
     heitz2014 (6), (7), (8) with the tabulated σ.
     """
-    stretched = alpha[0] * wi[0], alpha[1] * wi[1], wi[2]
-    theta = _inclination(incident(*stretched))
-    last = table.sigma.shape[0] - 1
-    sigma = length(*stretched) * jnp.interp(theta * last, jnp.arange(last + 1), table.sigma).astype(wm.dtype)
     cosine = stable.cosine(wi, wm)
     seen = (cosine > 0) & (wm[2] > 0) & (wi[2] > 0)
-    z = jnp.where(seen, wm[2], 1)
-    value = table.density(jnp.stack([-wm[0] / (z * alpha[0]), -wm[1] / (z * alpha[1])]))
-    # Factors, not quotients of quotients, which XLA divides by at once: z⁴ and more of it in the derivative underflow.
-    lifted = value * (1 / (z * z)) * (1 / (z * z))
-    return jnp.where(seen, lifted * ((cosine / sigma) / (alpha[0] * alpha[1])), 0)
+    x, y, z = wm[0], wm[1], jnp.where(seen, wm[2], 1)
+    share = _share(tuple(wi), tuple(wm), tuple(alpha), table.sigma, cosine)
+    if table.normals is None:
+        value = table.density(jnp.stack([-x / (z * alpha[0]), -y / (z * alpha[1])]))
+        # Factors, not quotients of quotients, which XLA divides by at once: z⁴ and more of it in the derivative underflow.
+        return jnp.where(seen, value * (1 / (z * z)) * (1 / (z * z)) * (share / (alpha[0] * alpha[1])), 0)
+    stretched = x / alpha[0], y / alpha[1], z
+    lobe = math.pi * _squares.lobe(alpha[0], alpha[1], _squares.stretched_square(jnp.stack([x, y, z]), alpha))
+    return jnp.where(seen, table.normals(stable.direction(*stretched)) * lobe * share, 0)
+
+
+def _area(w, alpha, sigma):
+    """Of the stretched direction: s, its length, σ over it and the derivative of that by the angle."""
+    s = stable.sqrt((alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2)
+    last = sigma.shape[0] - 1
+    place = jnp.minimum(jnp.arctan2(s, w[2]) / (math.pi / 2), 1) * last
+    i = jnp.clip(jnp.floor(place), 0, last - 1)
+    t, i = place - i, i.astype(int)
+    value = (sigma[i] * (1 - t) + sigma[i + 1] * t).astype(s.dtype)
+    return (
+        s,
+        stable.sqrt(s * s + w[2] ** 2),
+        value,
+        ((sigma[i + 1] - sigma[i]) * (last / (math.pi / 2))).astype(s.dtype),
+    )
+
+
+@jax.custom_jvp
+def _share(w, m, alpha, sigma, cosine):
+    r"""$\omega\cdot m/\sigma(\omega)$ by the table of σ. `cosine` is $\omega\cdot m$."""
+    _, norm, value, _ = _area(w, alpha, sigma)
+    return cosine / (norm * value)
+
+
+@_share.defjvp
+def _share_jvp(primals, tangents):
+    (w, _, alpha, sigma, _), dsigma = primals, tangents[3]
+    s, norm, value, by_angle = _area(w, alpha, sigma)
+    by_z, by_s = (value * w[2] - by_angle * s) / norm, (value * s + by_angle * w[2]) / norm
+    by_square = jnp.where(s > 0, by_s / jnp.where(s > 0, s, 1), 0)
+    quotient, area = _share(*primals), norm * value
+    change = turned_by(primals, tangents, quotient, area, by_z, by_square)
+    return quotient, change - quotient * (_area(w, alpha, dsigma)[2] / value)
