@@ -148,6 +148,37 @@ def test_the_bound_of_a_smooth_ellipsoid_keeps_its_small_derivative():
     assert measure(name, plain_bound, ("wi", "A"), "smooth", COUNT, library(name)).worst > 1
 
 
+def _jacobians(name, *args):
+    """By the second argument, in float32 and in float64, at the same numbers."""
+    found = []
+    for dtype in (np.float32, np.float64):
+        with jax.enable_x64(True):
+            given = [np.asarray(a, np.float32).astype(dtype) for a in args]
+            found.append(np.asarray(jax.jit(jax.jacrev(library(name), 1))(*given), np.float64))
+    return found
+
+
+@pytest.mark.parametrize("name", ["ellipsoid_cap", "ellipsoid_bounded"])
+def test_at_the_far_rim_of_a_rough_surface_a_sample_turns_as_it_should(name):
+    """c is nearly -i: the sum's terms cancel to 10⁻⁵, and in one word their derivatives to 3·10⁻³."""
+    A = [[6.414378, -1.6445675, 0], [0, 0.00027401315, 0], [-0.28940663, 0.10127684, 1]]
+    given = [0.99999607, 0.99996626], [0.0045500733, 0.99998963, 4.7793557e-05], A
+    plain, exact = _jacobians(f"sampling.{name}.sample", *given)
+    assert np.abs(plain - exact).max() < LIMIT * np.abs(exact).max()
+
+
+def test_a_change_along_the_incident_direction_does_not_move_the_bound():
+    """Else its derivative jumps along ω_i where the largest inclination takes over from the peak; on the sphere it does not."""
+    rng = np.random.default_rng(5)
+    for _ in range(8):
+        wi = rng.normal(size=3)
+        wi = np.abs(wi) / np.linalg.norm(wi)
+        A = np.array([[rng.uniform(0.05, 0.5), 0.02, 0], [0, rng.uniform(0.05, 0.5), 0], [*rng.normal(size=2), 1]])
+        with jax.enable_x64(True):
+            by_wi = np.asarray(jax.jit(jax.jacrev(library("sampling.ellipsoid_bounded.bound")))(wi, A))
+        assert abs(by_wi @ wi) < 1e-12 * np.linalg.norm(by_wi)
+
+
 def test_a_lost_term_is_caught_by_the_oracle():
     def frozen(w, wm, alpha):
         return library("masking.g1_ggx")(w, wm, jax.lax.stop_gradient(alpha))

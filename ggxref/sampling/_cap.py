@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from ggxref import _pairs, _special
+from ggxref import _pairs, _special, stable
 from ggxref._canonical import Canonical
 from ggxref._errorfree import two_sum
 from ggxref._matrix import length
@@ -35,20 +35,37 @@ def half_in_two_words(u: Vec2, azimuth: Azimuth, i: Pairs, cut: Scalar) -> Pairs
     return total(product(sine, c), x), total(product(sine, s), y), up
 
 
-def _plain(u, azimuth, i, cut):
-    h = sum_in_cap(u, incident(*i), cut / length(*i), lambda _: azimuth)
-    return h.x, h.y, h.z
+def _parts(u, i, cut):
+    """i in units of its length N; ρ = ‖(i.x, i.y)‖; by how much more c is away from the axis, without the difference; the sum's height."""
+    i, cut = incident(*i), cut / length(*i)
+    h = sum_in_cap(u, i, cut, lambda _: (jnp.zeros_like(cut), jnp.zeros_like(cut)))
+    rho = jnp.where(jnp.abs(i.z) > 0.5, length(i.x, i.y, 0), stable.sqrt(i.rise * i.fall))
+    both = stable.sqrt(h.square) + rho
+    both = jnp.where(both * both < jnp.finfo(both.dtype).tiny, 1, both)  # c is i is the pole
+    return i.x, i.y, rho, -h.z * h.climb / both, h.z
 
 
 @half_in_two_words.defjvp
 def _half_in_two_words_jvp(primals, tangents):
-    """A direction does not depend on the length of what it is made of, which is taken as constant."""
+    r"""Of $h = (\rho_c - \rho)\hat c + \rho(\hat c + \hat\imath)$, of the azimuths' unit vectors: where c is nearly -i, either bracket
+    is small, and is known without cancellation, the latter from h.
+
+    A direction does not depend on the length of what it is made of, which is taken as constant.
+    """
     (u, azimuth, i, cut), (du, dazimuth, di, dcut) = primals, tangents
-    azimuth, i, dazimuth, di = (tuple(value for value, _ in a) for a in (azimuth, i, dazimuth, di))
-    size = lax.stop_gradient(length(*i))
-    _, change = jax.jvp(_plain, (u, azimuth, i, cut), (du, dazimuth, di, dcut))
-    x, y, z = ((size * d, jnp.zeros_like(d)) for d in change)
-    return half_in_two_words(*primals), (x, y, z)
+    (c, s), i, (dc, ds), di = (tuple(value for value, _ in a) for a in (azimuth, i, dazimuth, di))
+    half, size = half_in_two_words(*primals), lax.stop_gradient(length(*i))
+    (x, y, rho, more, _), (dx, dy, drho, dmore, dz) = jax.jvp(_parts, (u, i, cut), (du, di, dcut))
+    at_pole, over = rho == 0, 1 / jnp.where(rho == 0, 1, rho)
+    x, y = x * over, y * over
+    turned = x * dy - y * dx
+    opposite = ((c + x) ** 2 + (s + y) ** 2 < 0.25) & (jnp.abs(more) < rho)
+    changes = []
+    for (h, _), a, da, b, db, aside in ((half[0], c, dc, x, dx, -y), (half[1], s, ds, y, dy, x)):
+        both = jnp.where(opposite, (h / size - more * a) * over, a + b)
+        changes.append(dmore * a + (more + rho) * da + jnp.where(at_pole, drho * a + db, drho * both + turned * aside))
+    x, y, z = ((size * d, jnp.zeros_like(d)) for d in (*changes, dz))
+    return half, (x, y, z)
 
 
 def half_vector(u: Vec2, wi: Vec3, A: Canonical, cut: Real, turn: Turn | None) -> Pairs:

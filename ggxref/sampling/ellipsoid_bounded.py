@@ -29,6 +29,7 @@ def _rounded_to_sphere(wi: Vec3, A: Canonical) -> Triple:
 def _largest_q(wi: Vec3, A: Canonical):
     """c² and c² (max Q - 1) over [0, θ₁]: Q is a sinusoid of 2θ with one maximum in [0°, 90°]."""
     c00, c10, c11, ex, ey = A
+    x, y, z = stable.turning(*wi)  # along ωi the maximum's derivative would jump where it moves to the end
     c = c00 * c11 * 2 / (length(c00 + c11, c10, 0) + length(c00 - c11, c10, 0))
     skew = length(ex, ey, 0)
     lift, gap = skew * skew, (1 - c) * (1 + c)
@@ -39,8 +40,8 @@ def _largest_q(wi: Vec3, A: Canonical):
     sunk = mean < 0
     peak = jnp.where(sunk, lift * c * c / jnp.where(sunk, amplitude - mean, 1), mean + amplitude)
     # cos 2θ₁ = −sin θi; cos²θ₁ = (1 − sin θi)/2.
-    sin_i = length(wi[0], wi[1], 0)
-    cos_square, sin_square = wi[2] ** 2 / (2 * (1 + sin_i)), (1 + sin_i) / 2
+    sin_i = length(x, y, 0)
+    cos_square, sin_square = z * z / (2 * (1 + sin_i)), (1 + sin_i) / 2
     slant = stable.sqrt(cos_square * sin_square)
     at_end = gap * sin_square + 2 * skew * slant + lift * cos_square
     return c * c, jnp.where(b >= -amplitude * sin_i, peak, at_end)
