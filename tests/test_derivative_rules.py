@@ -37,6 +37,7 @@ TWICE = {
     "bsdf.brdf_ggx": "typical smooth",
     "sampling.cross_section.sample": "typical anisotropic",
     "sampling.ellipsoid_bounded.bound": "typical skew smooth",
+    "sampling.lune.sample": "typical skew",
 }
 ONCE = {
     "ellipsoid.lune_area": "typical skew smooth",

@@ -112,7 +112,5 @@ def plain_point(u: Vec2, i: tuple[Scalar, Scalar, Scalar], side: Scalar, pole: T
     c, s = _special.cos_sin_turn(other / (8 * jnp.where(r == 0, 1, r)))
     along, across = r * jnp.where(wide, c, s), side * r * jnp.where(wide, s, c)
     sin_theta, (cosine, sine) = length(w.x, w.y, 0), stable.azimuth(w.x, w.y, stable.azimuth(*pole))
-    moved, lifted, height = crescent(along, edge * (2 - edge), w, sin_theta)
-    # Not (sin θ lifted - z moved) times the azimuth, which has no derivative where i lies along the pole.
-    away = w.z * moved
-    return lifted * w.x - away * cosine + across * sine, lifted * w.y - away * sine - across * cosine, height
+    outward, height = crescent(along, edge * (2 - edge), w, sin_theta)
+    return outward * cosine + across * sine, outward * sine - across * cosine, height

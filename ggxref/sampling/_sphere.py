@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 from jax import lax
 
@@ -84,32 +85,57 @@ def half_in_cap(u: Vec2, i: Incident, cut: Real, turn: Turn = _special.cos_sin_t
     return h.x - over * lax.stop_gradient(x), h.y - over * lax.stop_gradient(y), h.z
 
 
-def crescent(along: Scalar, rim: Scalar, i: Incident, sin_theta: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """Compress the unit disk to the silhouette of the lune between `i` and the pole, and lift it to the sphere.
-
-    - `along`: the disk point's coordinate towards the pole; `rim = 1 - r²`, its distance from the rim.
-    - `sin_theta = ‖(i.x, i.y)‖`.
-
-    Returns the point's coordinate towards the pole in i's frame, its coordinate along `i`, and its height z above the
-    plane through the pole's equator. z > 0 in exact arithmetic; here also, as no difference is formed.
-
-    dupuy2023 listing 2; walter2014 (38)–(41).
+def _lifted(along, rim, i):
+    """The disk point's chord, sqrt(1 - across²), and its parts below and above; of the compressed and lifted point, its coordinates
+    towards the pole in i's frame and along `i`.
     """
     s = i.rise / 2
-    half_chord = stable.sqrt(rim + along * along)  # sqrt(1 - across²)
+    half_chord = stable.sqrt(rim + along * along)
     opposite = half_chord + jnp.abs(along)
     near = rim / jnp.where(opposite > 0, opposite, 1)
     below_rim = jnp.where(along > 0, near, opposite)  # half_chord - along
     above_rim = jnp.where(along > 0, opposite, near)  # half_chord + along
     # One quantity twice: its first form cancels towards the horizon and below, its second towards the pole.
     moved = jnp.where(i.z < 1 / 3, s * above_rim - half_chord * i.z, half_chord * i.fall / 2 + s * along)
-    lifted = stable.sqrt(s * below_rim * (half_chord * i.fall + s * above_rim))
+    return half_chord, below_rim, above_rim, moved, stable.sqrt(s * below_rim * (half_chord * i.fall + s * above_rim))
+
+
+def _crescent(along: Scalar, rim: Scalar, i: Incident, sin_theta: Scalar) -> tuple[Scalar, Scalar]:
+    """Compress the unit disk to the silhouette of the lune between `i` and the pole, and lift it to the sphere.
+
+    - `along`: the disk point's coordinate towards the pole; `rim = 1 - r²`, its distance from the rim.
+    - `sin_theta = ‖(i.x, i.y)‖`.
+
+    Returns the point's coordinate in the azimuth of `i`, and its height z above the plane through the pole's equator.
+    z > 0 in exact arithmetic; here also, as no difference is formed.
+
+    dupuy2023 listing 2; walter2014 (38)–(41).
+    """
+    half_chord, _, above_rim, moved, lifted = _lifted(along, rim, i)
     # z = lifted i.z + moved sin_theta; where the terms differ in sign, times its conjugate.
     plus, minus = lifted * i.z, moved * sin_theta
     differ = ((plus > 0) & (minus < 0)) | ((plus < 0) & (minus > 0))
     conjugate = jnp.where(differ, plus - minus, 1)
-    z = jnp.where(differ, s * above_rim * (half_chord * i.z - moved) / conjugate, plus + minus)
-    return moved, lifted, z
+    z = jnp.where(differ, i.rise / 2 * above_rim * (half_chord * i.z - moved) / conjugate, plus + minus)
+    return lifted * sin_theta - moved * i.z, z
+
+
+crescent = jax.custom_jvp(_crescent)
+
+
+@crescent.defjvp
+def _crescent_jvp(primals, tangents):
+    """Where `i` sinks by an angle, the point turns about the axis across by it less (below_rim/2) sin_theta/lifted of it, which near
+    the rim is nearly all. Of `lifted` and (below_rim/2) sin_theta, the squares differ by (i.rise/2) rim.
+    """
+    along, rim, i, sin_theta = primals
+    dalong, drim, di, dsin_theta = tangents
+    by_disk = jax.jvp(lambda along, rim: _crescent(along, rim, i, sin_theta), (along, rim), (dalong, drim))
+    (outward, z), (doutward, dz) = by_disk
+    _, below_rim, _, _, lifted = _lifted(along, rim, i)
+    both = jnp.where(lifted > 0, lifted * (lifted + below_rim * sin_theta / 2), 1)
+    turn = jnp.where(lifted > 0, i.rise / 2 * rim, 0) / both * (i.z * dsin_theta - sin_theta * di.z)
+    return (outward, z), (doutward + z * turn, dz - outward * turn)
 
 
 def unstretch(x: Scalar, y: Scalar, z: Scalar, alpha: Vec2) -> Vec3:

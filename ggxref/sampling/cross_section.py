@@ -54,6 +54,6 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2, *, turn: Turn = _special.cos_sin_turn
     r = stable.sqrt(u[1])
     across, along = r * cos_phi, r * sin_phi
     sin_theta = stable.sqrt(i.x * i.x + i.y * i.y)
-    moved, lifted, z = crescent(along, 1 - u[1], i, sin_theta)
-    x, y = _unstretched(lifted * sin_theta - moved * i.z, across, i, wi, alpha)
+    outward, z = crescent(along, 1 - u[1], i, sin_theta)
+    x, y = _unstretched(outward, across, i, wi, alpha)
     return stable.direction(x, y, z)
