@@ -125,12 +125,12 @@ def test_samples_beside_the_azimuth_of_the_larger_roughness():
 def test_points_beside_the_rim_of_the_disk_turn_by_little():
     """As the height of the point on the sphere is small there: by ω_i, 3e-3 of its change as a difference."""
     A = np.array([[1.1343595, 9.2107266e-2, 0], [0, 4.3569357e-4, 0], [-1.4835156e-2, 6.7633010e-2, 1]], np.float32)
-    u, wi = np.float32([1.864018e-6, 1.4125832e-5]), np.float32([0.97746122, 0.21111488, 2.2517027e-4])
+    u, wi = (np.array(x, np.float32) for x in ([1.864018e-6, 1.4125832e-5], [0.97746122, 0.21111488, 2.2517027e-4]))
     slopes = jax.jit(jax.jacrev(lune.sample, 1))
     found = np.array(slopes(u, wi, A))
     with jax.enable_x64(True):
         expected = np.array(slopes(*(x.astype(np.float64) for x in (u, wi, A))))
-    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-5 * np.linalg.norm(expected))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-5 * float(np.linalg.norm(expected)))
 
 
 @pytest.mark.parametrize("alpha", [1e-11, 1e-12])
