@@ -16,6 +16,7 @@ import numpy as np
 from jax import Array
 
 from ggxref import _squares, stable
+from ggxref._errorfree import two_sum
 from ggxref._seen import turned_by
 from ggxref._types import Scalar, Vec2, Vec3
 from ggxref.sampling._sphere import incident, unstretch
@@ -102,26 +103,55 @@ def build(
     return Table(*single, density=density, normals=normals)
 
 
-def _bilinear(table: Array, row: Scalar, column: Scalar) -> Scalar:
-    """The table between its entries, at a row and a column in [0, 1]."""
+Both = tuple[Scalar, Scalar]  # a number in [0, 1] and 1 minus it: where either is small, it keeps its digits
+
+
+def _cell(place: Both, last: int):
+    """The cell's ends, the one that is nearer to its end of the table first, and where in between."""
+    low, high = place[0] * last, place[1] * last
+    upwards = low <= high
+    first = jnp.clip(jnp.floor(jnp.where(upwards, low, high)), 0, last - 1)
+    weight = (jnp.where(upwards, low, high) - first).astype(low.dtype)
+    first = first.astype(int)
+    near, far = (jnp.where(upwards, k, last - k) for k in (first, first + 1))
+    return near, far, weight
+
+
+def _bilinear(table: Array, row: Both, column: Both) -> tuple[Scalar, Both]:
+    """An angle between the table's entries, and its distances from -π/2 and π/2, each with its digits.
+
+    By differences of entries, which are exact, and from the entry nearest to the table's ends, where angles are ±π/2.
+    """
     last = table.shape[0] - 1
-    r, c = row * last, column * last
-    i, j = jnp.clip(jnp.floor(r), 0, last - 1), jnp.clip(jnp.floor(c), 0, last - 1)
-    s, t = (r - i).astype(row.dtype), (c - j).astype(row.dtype)
-    i, j = i.astype(int), j.astype(int)
-    upper = table[i, j] * (1 - t) + table[i, j + 1] * t
-    lower = table[i + 1, j] * (1 - t) + table[i + 1, j + 1] * t
-    return (upper * (1 - s) + lower * s).astype(row.dtype)
+    (i, k, s), (j, m, t) = _cell(row, last), _cell(column, last)
+    corner, along, down, across = (table[p, q].astype(s.dtype) for p, q in ((i, j), (i, m), (k, j), (k, m)))
+    change = t * (along - corner) + s * ((down - corner) + t * ((across - along) - (down - corner)))
+    low, high = (jnp.maximum(_from_right_angle(c), 0) for c in (-corner, corner))
+    return corner + change, (low + change, high - change)
 
 
-def _column(u: Scalar) -> Scalar:
+def _from_right_angle(angle: Scalar) -> Scalar:
+    """`π/2 - angle`, rounded once."""
+    value = jnp.asarray(math.pi / 2, angle.dtype)
+    rest = {jnp.dtype("float32"): math.pi / 2 - float(np.float32(math.pi / 2))}.get(angle.dtype, 6.123233995736766e-17)
+    total, lost = two_sum(value, -angle)
+    return total + (lost + rest)
+
+
+def _column(u: Scalar) -> Both:
     """Where `u` stands in a table: the inverses fall off like roots at 0 and 1, and this spreads both ends."""
-    return jnp.arctan2(stable.sqrt(u), stable.sqrt(1 - u)) / (math.pi / 2)
+    return _shares(stable.sqrt(u), stable.sqrt(1 - u))
 
 
-def _inclination(i) -> Scalar:
-    """Angle of the stretched direction from n over π/2."""
-    return jnp.arctan2(stable.sqrt(i.x * i.x + i.y * i.y), i.z) / (math.pi / 2)
+def _shares(sine: Scalar, cosine: Scalar) -> Both:
+    """An angle, and its complement, over π/2."""
+    return jnp.arctan2(sine, cosine) / (math.pi / 2), jnp.arctan2(cosine, sine) / (math.pi / 2)
+
+
+def _cos_sin(angle: Scalar, sides: Both) -> Both:
+    """Cosine and sine of what `_bilinear` returns."""
+    low, high = sides
+    return jnp.sin(jnp.where(low < high, low, high)), jnp.sin(angle)
 
 
 def sample(u: Vec2, wi: Vec3, alpha: Vec2, table: Table) -> Vec3:
@@ -133,12 +163,13 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2, table: Table) -> Vec3:
     heitz2014 algorithm 4 with the tables of §5.3.
     """
     i = incident(alpha[0] * wi[0], alpha[1] * wi[1], wi[2])
-    psi = _bilinear(table.psi, _inclination(i), _column(u[0]))
-    phi = _bilinear(table.phi, psi / math.pi + 0.5, _column(u[1]))
-    cos_phi = jnp.cos(phi)
-    along, across = -jnp.sin(psi) * cos_phi, -jnp.sin(phi)
+    inclination = _shares(stable.sqrt(i.x * i.x + i.y * i.y), i.z)
+    psi, (low, high) = _bilinear(table.psi, inclination, _column(u[0]))
+    cos_psi, sin_psi = _cos_sin(psi, (low, high))
+    cos_phi, sin_phi = _cos_sin(*_bilinear(table.phi, (low / math.pi, high / math.pi), _column(u[1])))
+    along, across = -sin_psi * cos_phi, -sin_phi
     cos_i, sin_i = stable.azimuth(i.x, i.y)
-    return unstretch(cos_i * along - sin_i * across, sin_i * along + cos_i * across, jnp.cos(psi) * cos_phi, alpha)
+    return unstretch(cos_i * along - sin_i * across, sin_i * along + cos_i * across, cos_psi * cos_phi, alpha)
 
 
 def pdf(wm: Vec3, wi: Vec3, alpha: Vec2, table: Table) -> Scalar:
