@@ -165,7 +165,8 @@ DIRECTIONS = ("w", "wi", "wo", "wm", "v")
 def rounded(points: Points, dtype) -> Points:
     """Points in `dtype`, directions within half an ulp of unit ones; a uniform number that rounds up to 1 becomes 1/2."""
     long = {name: _unit(value.astype(np.longdouble)) for name, value in points.items() if name in DIRECTIONS}
-    cast = {name: value.astype(dtype) for name, value in (points | long).items()}
+    with np.errstate(over="ignore"):  # float16 ends at 65504
+        cast = {name: value.astype(dtype) for name, value in (points | long).items()}
     if "u" in cast:
         cast["u"] = np.where(cast["u"] < 1, cast["u"], np.asarray(0.5, dtype))
     return cast
