@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 
 import jax
+from page_faults import POINTS as DONATED
 from page_faults import in_place
 from part import write_part
 
@@ -32,7 +33,7 @@ SETTINGS = {
 }
 # Seconds: at 2²² points ten calls, before which Mitsuba's threads still take a core.
 SETTLE = 0.1
-SIZES, DONATED = (1 << 8, 1 << 12, 1 << 16, 1 << 18, 1 << 20), 1 << 22
+SIZES = 1 << 8, 1 << 12, 1 << 16, 1 << 18, 1 << 20
 
 
 def measured(size: int, bits: int) -> dict[str, tuple[float, float]]:

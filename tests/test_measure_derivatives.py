@@ -122,14 +122,21 @@ def test_samples_beside_the_azimuth_of_the_larger_roughness():
     assert measure(name, library(name), ("u", "wi", "alpha"), "ordinals", 4096).worst < 5e-5
 
 
+def _jacobians(name, *args):
+    """By the second argument, in float32 and in float64, at the same numbers."""
+    found = []
+    for dtype in (np.float32, np.float64):
+        with jax.enable_x64(True):
+            given = [np.asarray(a, np.float32).astype(dtype) for a in args]
+            found.append(np.asarray(jax.jit(jax.jacrev(library(name), 1))(*given), np.float64))
+    return found
+
+
 def test_points_beside_the_rim_of_the_disk_turn_by_little():
     """As the height of the point on the sphere is small there: by ω_i, 3e-3 of its change as a difference."""
-    A = np.array([[1.1343595, 9.2107266e-2, 0], [0, 4.3569357e-4, 0], [-1.4835156e-2, 6.7633010e-2, 1]], np.float32)
-    u, wi = (np.array(x, np.float32) for x in ([1.864018e-6, 1.4125832e-5], [0.97746122, 0.21111488, 2.2517027e-4]))
-    slopes = jax.jit(jax.jacrev(lune.sample, 1))
-    found = np.array(slopes(u, wi, A))
-    with jax.enable_x64(True):
-        expected = np.array(slopes(*(x.astype(np.float64) for x in (u, wi, A))))
+    A = [[1.1343595, 9.2107266e-2, 0], [0, 4.3569357e-4, 0], [-1.4835156e-2, 6.7633010e-2, 1]]
+    u, wi = [1.864018e-6, 1.4125832e-5], [0.97746122, 0.21111488, 2.2517027e-4]
+    found, expected = _jacobians("sampling.lune.sample", u, wi, A)
     np.testing.assert_allclose(found, expected, rtol=0, atol=2e-5 * float(np.linalg.norm(expected)))
 
 
@@ -144,7 +151,7 @@ def test_bounding_sphere_of_extreme_ellipsoids_has_derivatives(alpha):
     assert all(np.isfinite(slopes).all() for slopes in found)
 
 
-def plain_bound(wi, A):
+def bound_by_autodiff(wi, A):
     """The bound as it is defined, of a canonical `A`, by autodiff."""
     i = A @ wi
     c_square, q = ellipsoid_bounded._largest_q(wi, canonical_terms(A))
@@ -156,17 +163,7 @@ def test_the_bound_of_a_smooth_ellipsoid_keeps_its_small_derivative():
     name = "sampling.ellipsoid_bounded.bound"
     for region in ("smooth", "skew"):
         assert measure(name, library(name), ("wi", "A"), region, 4096).worst < 2e-5
-    assert measure(name, plain_bound, ("wi", "A"), "smooth", COUNT, library(name)).worst > 1
-
-
-def _jacobians(name, *args):
-    """By the second argument, in float32 and in float64, at the same numbers."""
-    found = []
-    for dtype in (np.float32, np.float64):
-        with jax.enable_x64(True):
-            given = [np.asarray(a, np.float32).astype(dtype) for a in args]
-            found.append(np.asarray(jax.jit(jax.jacrev(library(name), 1))(*given), np.float64))
-    return found
+    assert measure(name, bound_by_autodiff, ("wi", "A"), "smooth", COUNT, library(name)).worst > 1
 
 
 @pytest.mark.parametrize("name", ["ellipsoid_cap", "ellipsoid_bounded"])
