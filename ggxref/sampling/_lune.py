@@ -64,7 +64,7 @@ def _compressed(half: Pair, below_rim: Pair, above_rim: Pair, z: Pair, rise: Pai
     return moved, lifted, product(share, less(level, moved))
 
 
-def _turned(moved: Pair, lifted: Pair, numerator: Pair, z: Pair, flat: Pair, norm_square: Pair) -> tuple[Pair, Pair]:
+def _tilted(moved: Pair, lifted: Pair, numerator: Pair, z: Pair, flat: Pair, norm_square: Pair) -> tuple[Pair, Pair]:
     """The point away from the pole, towards `i`, and its height, both times N²."""
     height = sum_by_squares(product(lifted, z), product(moved, flat), product(numerator, norm_square))
     return less(product(flat, lifted), product(z, moved)), height
@@ -82,7 +82,7 @@ def point(u: Vec2, i: Pairs, side: Scalar, pole: Two) -> Pairs:
     along, across, rim = one_pass(along, scaled(across, side), rim)
     half, below_rim, above_rim = one_pass(*_chord(along, rim))
     moved, lifted, numerator = one_pass(*_compressed(half, below_rim, above_rim, z, rise, fall))
-    out, height = _turned(moved, lifted, numerator, z, flat, norm_square)
+    out, height = _tilted(moved, lifted, numerator, z, flat, norm_square)
     out, height = one_pass(out, product(S, height))
     across = product(across, norm_square)
     x, y = total(product(out, X), product(across, Y)), less(product(out, Y), product(across, X))

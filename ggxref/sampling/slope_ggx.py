@@ -82,11 +82,11 @@ def _plain_point(u, x, y, z):
     # In a loop of their own: each component that takes them would compute them again.
     c, s = stable.one_loop(*_kepler.kepler(jnp.where(upper, 1 - u[1], u[1])))
     along, across = -sin_psi * s, length * jnp.where(upper, -c, c)
-    cos_i, sin_i, one = _azimuth(x, y, flat)
+    cos_i, sin_i, one = _scaled_azimuth(x, y, flat)
     return cos_i * along - sin_i * across, sin_i * along + cos_i * across, one * (cos_psi * s)
 
 
-def _azimuth(x, y, flat):
+def _scaled_azimuth(x, y, flat):
     """Cosine, sine and 1, all times `flat` times a power of two: nothing is divided, and nothing underflows."""
     pole, scale = flat <= 0, reciprocal_scale(flat)
     x, y = jnp.where(pole, 1, x * scale), jnp.where(pole, 0, y * scale)
