@@ -192,3 +192,23 @@ def test_dielectric_of_a_small_index(dtype):
     with jax.enable_x64(True):
         expected = np.array(slopes(*(a.astype(np.float64) for a in args)))
     np.testing.assert_allclose(found, expected, rtol=2e-3 if dtype == np.float16 else 1e-5)
+
+
+SECOND_BY_WI = {
+    name: jax.jit(jax.hessian(public(f"sampling.{name}.sample"), 1)) for name in ("cross_section", "lune")
+}  # compiled once for all points
+
+
+@pytest.mark.parametrize("name", SECOND_BY_WI)
+@pytest.mark.parametrize("wi", [[0, 0, 1], [1e-6, 2e-6, 1], [1e-12, 2e-12, 1], [1e-6, 2e-6, -1]])
+def test_second_derivatives_of_smooth_surfaces_near_the_poles_do_not_underflow(name, wi):
+    """Of a rule with a square as divisor the derivative has its square: (αx)⁴ is below float32's range, and 0/0 is NaN."""
+    shape = [1e-4, 1e-4] if name == "cross_section" else np.diag([1e-4, 1e-4, 1])
+    for u in ([0.3, 0.7], [1e-30, 0.3]):
+        found = []
+        for dtype in (np.float32, np.float64):
+            with jax.enable_x64(True):
+                args = [np.asarray(x, np.float32).astype(dtype) for x in (u, wi, shape)]
+                found.append(np.asarray(SECOND_BY_WI[name](*args), np.float64))
+        single, exactly = found
+        assert np.abs(single - exactly).max() <= 2e-6 * np.abs(exactly).max()

@@ -138,3 +138,34 @@ def test_samples_beside_the_ends_of_the_tables_keep_their_digits(small):
     found, exactly = compiled(sample)(*args), compiled(sample)(*(a.astype(np.float64) for a in args))
     assert np.linalg.norm(found - exactly, axis=0).max() < 3e-5
     assert measure("table.sample", sample, ("u", "wi", "alpha"), "ordinals", 4096).worst < 5e-4
+
+
+def test_nan_stays(small):
+    """In any number of an argument, whichever density the table has."""
+    sample_args = dict(u=[0.3, 0.6], wi=[0.48, 0.36, 0.8], alpha=[0.3, 0.5])
+    pdf_args = dict(wm=[0.0, 0.28, 0.96]) | {k: sample_args[k] for k in ("wi", "alpha")}
+    for function, given in ((table.sample, sample_args), (table.pdf, pdf_args)):
+        for t in small:
+            compute = jax.jit(partial(function, table=t))
+            given = {k: np.asarray(x, np.float32) for k, x in given.items()}
+            assert np.isfinite(compute(**given)).all()
+            for name, x in given.items():
+                for k in range(x.size):
+                    lost = np.where(np.arange(x.size) == k, np.nan, x).astype(np.float32)
+                    assert np.isnan(compute(**given | {name: lost})).any(), (function.__name__, name, k)
+
+
+@pytest.mark.parametrize("half", [jnp.float16, jnp.bfloat16])
+def test_half_precision_is_computed_in_single(small, half):
+    """As the table is float32, so is the result: that of the same numbers in float32."""
+    u, wi, wm, alpha = (jnp.asarray(x, half) for x in ([0.3, 0.6], [0.48, 0.36, 0.8], [0.0, 0.28, 0.96], [0.3, 0.5]))
+    for function, *args in ((table.sample, u, wi, alpha), (table.pdf, wm, wi, alpha)):
+        np.testing.assert_array_equal(
+            function(*args, small[1]), function(*(a.astype(np.float32) for a in args), small[1])
+        )
+
+
+def test_density_where_that_of_slopes_underflows_is_0(small):
+    """0 times an infinite 1/z⁴ is NaN."""
+    wm = jnp.asarray([1, 0, 1e-20], jnp.float32)
+    assert jax.jit(table.pdf)(wm, direction(0.5), ALPHA, small[0]) == 0

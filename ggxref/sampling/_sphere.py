@@ -133,8 +133,10 @@ def _crescent_jvp(primals, tangents):
     by_disk = jax.jvp(lambda along, rim: _crescent(along, rim, i, sin_theta), (along, rim), (dalong, drim))
     (outward, z), (doutward, dz) = by_disk
     _, below_rim, _, _, lifted = _lifted(along, rim, i)
-    both = jnp.where(lifted > 0, lifted * (lifted + below_rim * sin_theta / 2), 1)
-    turn = jnp.where(lifted > 0, i.rise / 2 * rim, 0) / both * (i.z * dsin_theta - sin_theta * di.z)
+    # By one quotient after the other: of their product, the second derivatives have the square.
+    share = jnp.where(lifted > 0, i.rise / 2 * rim, 0) / jnp.where(lifted > 0, lifted, 1)
+    share = share / jnp.where(lifted > 0, lifted + below_rim * sin_theta / 2, 1)
+    turn = share * (i.z * dsin_theta - sin_theta * di.z)
     return (outward, z), (doutward + z * turn, dz - outward * turn)
 
 

@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from ggxref import _special, stable
+from ggxref._matrix import length
 from ggxref._types import Scalar, Turn, Vec2, Vec3
 from ggxref.sampling._sphere import Incident, crescent, incident
 from ggxref.sampling._visible import pdf_ggx as pdf
@@ -31,8 +32,8 @@ def _unstretched_jvp(primals, tangents):
     (o, a, i, wi, (ax, ay)), (do, da, _, dwi, (dax, day)) = primals, tangents
     c, s = _azimuth(i)
     p, q = ax * wi[0], ay * wi[1]
-    square = p * p + q * q
-    turn = jnp.where(square > 0, p * (ay * dwi[1]) - q * (ax * dwi[0]), 0) / jnp.where(square > 0, square, 1)
+    size = length(p, q, 0)  # not its square, whose square is a divisor of the second derivatives
+    turn = jnp.where(size > 0, c * (ay * dwi[1]) - s * (ax * dwi[0]), 0) / jnp.where(size > 0, size, 1)
     do, da = do - a * turn, da + o * turn
     dx = ax * (c * do - s * da) + dax * (c * (1 + s * s) * o - s**3 * a) - day * (ax / ay) * c * s * (s * o + c * a)
     dy = ay * (s * do + c * da) + day * (s * (1 + c * c) * o + c**3 * a) + dax * (ay / ax) * c * s * (s * a - c * o)
