@@ -133,7 +133,7 @@ def _bilinear(table: Array, row: Both, column: Both) -> tuple[Scalar, Both]:
 def _from_right_angle(angle: Scalar) -> Scalar:
     """`π/2 - angle`, rounded once."""
     value = jnp.asarray(math.pi / 2, angle.dtype)
-    rest = {jnp.dtype("float32"): math.pi / 2 - float(np.float32(math.pi / 2))}.get(angle.dtype, 6.123233995736766e-17)
+    rest = math.pi / 2 - float(np.float32(math.pi / 2)) if angle.dtype == jnp.float32 else 6.123233995736766e-17
     total, lost = two_sum(value, -angle)
     return total + (lost + rest)
 
@@ -154,11 +154,12 @@ def _cos_sin(angle: Scalar, sides: Both) -> Both:
     return jnp.sin(jnp.where(low < high, low, high)), jnp.sin(angle)
 
 
+@stable.widened
 def sample(u: Vec2, wi: Vec3, alpha: Vec2, table: Table) -> Vec3:
     """Look up the slope along `wi`, then the slope across; rotate and unstretch.
 
     - `u`: in [0, 1)², (2,). `wi`: unit, (3,), above the horizon. `alpha`: positive, (2,).
-    - Returns a micronormal whose density is `pdf` but for the interpolation: unit, (3,).
+    - Returns a micronormal whose density is `pdf` but for the interpolation: unit, (3,); float32 of half precision, as the table is.
 
     heitz2014 algorithm 4 with the tables of §5.3.
     """
@@ -172,6 +173,7 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2, table: Table) -> Vec3:
     return unstretch(cos_i * along - sin_i * across, sin_i * along + cos_i * across, cos_psi * cos_phi, alpha)
 
 
+@stable.widened
 def pdf(wm: Vec3, wi: Vec3, alpha: Vec2, table: Table) -> Scalar:
     r"""$\max(0, \omega_i\cdot\omega_m)\,P^{22}(\tilde x/\alpha_x, \tilde y/\alpha_y)/(\alpha_x\alpha_y z_m^4\,\sigma(\omega_i))$ [1/sr].
 
@@ -180,47 +182,47 @@ def pdf(wm: Vec3, wi: Vec3, alpha: Vec2, table: Table) -> Scalar:
     heitz2014 (6), (7), (8) with the tabulated σ.
     """
     cosine = stable.cosine(wi, wm)
-    seen = (cosine > 0) & (wm[2] > 0) & (wi[2] > 0)
+    seen = ~((cosine <= 0) | (wm[2] <= 0) | (wi[2] <= 0))
     x, y, z = wm[0], wm[1], jnp.where(seen, wm[2], 1)
     share = _share(tuple(wi), tuple(wm), tuple(alpha), table.sigma, cosine)
     if table.normals is None:
         value = table.density(jnp.stack([-x / (z * alpha[0]), -y / (z * alpha[1])]))
-        # Factors, not quotients of quotients, which XLA divides by at once: z⁴ and more of it in the derivative underflow.
-        return jnp.where(seen, value * (1 / (z * z)) * (1 / (z * z)) * (share / (alpha[0] * alpha[1])), 0)
+        over = (
+            1 / z
+        )  # four factors: neither z⁴ nor a quotient of quotients, which XLA divides by at once; both underflow
+        return jnp.where(seen, value * over * over * over * over * (share / (alpha[0] * alpha[1])), 0)
     stretched = x / alpha[0], y / alpha[1], z
     lobe = math.pi * _squares.lobe(alpha[0], alpha[1], _squares.stretched_square(jnp.stack([x, y, z]), alpha))
     return jnp.where(seen, table.normals(stable.direction(*stretched)) * lobe * share, 0)
 
 
-def _area(w, alpha, sigma):
-    """Of the stretched direction: s, its length, σ over it and the derivative of that by the angle."""
+def _inclined(w, alpha, last):
+    """‖(x, y)‖ and length of the stretched direction, the cell of its inclination and where in it."""
     s = stable.sqrt((alpha[0] * w[0]) ** 2 + (alpha[1] * w[1]) ** 2)
-    last = sigma.shape[0] - 1
     place = jnp.minimum(jnp.arctan2(s, w[2]) / (math.pi / 2), 1) * last
-    i = jnp.clip(jnp.floor(place), 0, last - 1)
-    t, i = place - i, i.astype(int)
-    value = (sigma[i] * (1 - t) + sigma[i + 1] * t).astype(s.dtype)
-    return (
-        s,
-        stable.sqrt(s * s + w[2] ** 2),
-        value,
-        ((sigma[i + 1] - sigma[i]) * (last / (math.pi / 2))).astype(s.dtype),
-    )
+    cell = jnp.clip(jnp.floor(place), 0, last - 1)
+    return s, stable.sqrt(s * s + w[2] ** 2), cell.astype(int), place - cell
+
+
+def _between(values, cell, t):
+    return values[cell] * (1 - t) + values[cell + 1] * t
 
 
 @jax.custom_jvp
 def _share(w, m, alpha, sigma, cosine):
     r"""$\omega\cdot m/\sigma(\omega)$ by the table of σ. `cosine` is $\omega\cdot m$."""
-    _, norm, value, _ = _area(w, alpha, sigma)
-    return cosine / (norm * value)
+    _, norm, *place = _inclined(w, alpha, sigma.shape[0] - 1)
+    return cosine / (norm * _between(sigma, *place))
 
 
 @_share.defjvp
 def _share_jvp(primals, tangents):
     (w, _, alpha, sigma, _), dsigma = primals, tangents[3]
-    s, norm, value, by_angle = _area(w, alpha, sigma)
+    last = sigma.shape[0] - 1
+    s, norm, cell, t = _inclined(w, alpha, last)
+    value, by_angle = _between(sigma, cell, t), (sigma[cell + 1] - sigma[cell]) * (last / (math.pi / 2))
     by_z, by_s = (value * w[2] - by_angle * s) / norm, (value * s + by_angle * w[2]) / norm
     by_square = jnp.where(s > 0, by_s / jnp.where(s > 0, s, 1), 0)
-    quotient, area = _share(*primals), norm * value
-    change = turned_by(primals, tangents, quotient, area, by_z, by_square)
-    return quotient, change - quotient * (_area(w, alpha, dsigma)[2] / value)
+    quotient = _share(*primals)
+    change = turned_by(primals, tangents, quotient, norm * value, by_z, by_square)
+    return quotient, change - quotient * (_between(dsigma, cell, t) / value)
