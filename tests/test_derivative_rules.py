@@ -212,3 +212,10 @@ def test_second_derivatives_of_smooth_surfaces_near_the_poles_do_not_underflow(n
                 found.append(np.asarray(SECOND_BY_WI[name](*args), np.float64))
         single, exactly = found
         assert np.abs(single - exactly).max() <= 2e-6 * np.abs(exactly).max()
+
+
+def test_second_derivatives_of_an_ellipsoid_cap_at_its_centre_are_finite():
+    """The sum's distance from the axis is 3·10⁻¹⁶ there, whose cube is 0."""
+    wi, A = jnp.asarray([1e-12, 2e-12, 1], jnp.float32), jnp.diag(jnp.asarray([1e-4, 1e-4, 1], jnp.float32))
+    twice = jax.jacfwd(jax.jacrev(public("sampling.ellipsoid_cap.sample"), 1), 1)
+    assert np.isfinite(jax.jit(twice)(jnp.zeros(2, jnp.float32), wi, A)).all()

@@ -9,7 +9,7 @@ from jax import lax
 from ggxref import _pairs, _special, stable
 from ggxref._canonical import Canonical
 from ggxref._errorfree import two_sum
-from ggxref._matrix import length
+from ggxref._matrix import length, reciprocal_scale
 from ggxref._pairs import Pair, Pairs, less, one_pass, product, square_root, total
 from ggxref._types import Real, Scalar, Turn, Vec2, Vec3
 from ggxref.sampling._ellipsoid import poles, shortened, to_sphere
@@ -42,7 +42,8 @@ def _parts(u, i, cut):
     rho = jnp.where(jnp.abs(i.z) > 0.5, length(i.x, i.y, 0), stable.sqrt(i.rise * i.fall))
     both = stable.sqrt(h.square) + rho
     both = jnp.where(both * both < jnp.finfo(both.dtype).tiny, 1, both)  # c is i is the pole
-    return i.x, i.y, rho, -h.z * h.climb / both, h.z
+    scale = reciprocal_scale(both)  # of the second derivatives both³ is a divisor
+    return i.x, i.y, rho, -h.z * (h.climb * scale) / (both * scale), h.z
 
 
 @half_in_two_words.defjvp
