@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from exact import BITS, STEP, leaves, moved
-from library import public
+from library import hastily, public
 
 from ggxref import fresnel
 from ggxref.measure.accuracy import arguments
@@ -52,15 +52,6 @@ CASES = TWICE | ONCE
 COUNT = 2  # points a region
 # Errors over the sum of the terms of each derivative. Measured at most 1.8e-14 and 3e-14, both of the BRDF of smooth surfaces.
 FIRST, SECOND = 1e-12, 1e-12
-# Half of the compiler's time; what is computed is the same but for rounding.
-HASTE = {"xla_backend_optimization_level": 0, "xla_cpu_use_fusion_emitters": False}
-
-
-def hastily(function, args):
-    try:
-        return jax.jit(function).lower(*args).compile(HASTE)(*args)
-    except jax.errors.JaxRuntimeError:  # another version's compiler, without that option
-        return jax.jit(function)(*args)
 
 
 def flat(function, draws):
@@ -192,30 +183,3 @@ def test_dielectric_of_a_small_index(dtype):
     with jax.enable_x64(True):
         expected = np.array(slopes(*(a.astype(np.float64) for a in args)))
     np.testing.assert_allclose(found, expected, rtol=2e-3 if dtype == np.float16 else 1e-5)
-
-
-SECOND_BY_WI = {
-    name: jax.jit(jax.hessian(public(f"sampling.{name}.sample"), 1)) for name in ("cross_section", "lune")
-}  # compiled once for all points
-
-
-@pytest.mark.parametrize("name", SECOND_BY_WI)
-@pytest.mark.parametrize("wi", [[0, 0, 1], [1e-6, 2e-6, 1], [1e-12, 2e-12, 1], [1e-6, 2e-6, -1]])
-def test_second_derivatives_of_smooth_surfaces_near_the_poles_do_not_underflow(name, wi):
-    """Of a rule with a square as divisor the derivative has its square: (αx)⁴ is below float32's range, and 0/0 is NaN."""
-    shape = [1e-4, 1e-4] if name == "cross_section" else np.diag([1e-4, 1e-4, 1])
-    for u in ([0.3, 0.7], [1e-30, 0.3]):
-        found = []
-        for dtype in (np.float32, np.float64):
-            with jax.enable_x64(True):
-                args = [np.asarray(x, np.float32).astype(dtype) for x in (u, wi, shape)]
-                found.append(np.asarray(SECOND_BY_WI[name](*args), np.float64))
-        single, exactly = found
-        assert np.abs(single - exactly).max() <= 2e-6 * np.abs(exactly).max()
-
-
-def test_second_derivatives_of_an_ellipsoid_cap_at_its_centre_are_finite():
-    """The sum's distance from the axis is 3·10⁻¹⁶ there, whose cube is 0."""
-    wi, A = jnp.asarray([1e-12, 2e-12, 1], jnp.float32), jnp.diag(jnp.asarray([1e-4, 1e-4, 1], jnp.float32))
-    twice = jax.jacfwd(jax.jacrev(public("sampling.ellipsoid_cap.sample"), 1), 1)
-    assert np.isfinite(jax.jit(twice)(jnp.zeros(2, jnp.float32), wi, A)).all()
