@@ -66,7 +66,8 @@ def build(
       `partial(slopes.student_t, alpha=jnp.ones(2), gamma=4.0)`. Its tails may fall no slower than GGX's.
     - `size`: at least 2. The paper's is 1024, 8 MB for both.
     - `normals`: the same at α = 1 as a density of micronormals (3,), D; for instance `partial(ndf.ggx, alpha=jnp.ones(2))`. Derivatives
-      of `pdf` by grazing ω_m need it: of $P^{22}/z_m^4$ they are differences that cancel, and of P22 alone they underflow.
+      of `pdf` by grazing ω_m need it: of $P^{22}/z_m^4$ they are differences that cancel, and of P22 alone they underflow;
+      at z_m = 1e-20 they are not finite.
 
     heitz2014 (10)–(13) and §5.3.
     """
@@ -187,9 +188,8 @@ def pdf(wm: Vec3, wi: Vec3, alpha: Vec2, table: Table) -> Scalar:
     share = _share(tuple(wi), tuple(wm), tuple(alpha), table.sigma, cosine)
     if table.normals is None:
         value = table.density(jnp.stack([-x / (z * alpha[0]), -y / (z * alpha[1])]))
-        over = (
-            1 / z
-        )  # four factors: neither z⁴ nor a quotient of quotients, which XLA divides by at once; both underflow
+        # Four factors: z⁴, and a quotient of quotients, which XLA divides by at once, both underflow.
+        over = 1 / z
         return jnp.where(seen, value * over * over * over * over * (share / (alpha[0] * alpha[1])), 0)
     stretched = x / alpha[0], y / alpha[1], z
     lobe = math.pi * _squares.lobe(alpha[0], alpha[1], _squares.stretched_square(jnp.stack([x, y, z]), alpha))
