@@ -205,6 +205,7 @@ def _inclined(w, alpha, last):
 
 
 def _between(values, cell, t):
+    """Linear between the ends of a cell."""
     return values[cell] * (1 - t) + values[cell + 1] * t
 
 
