@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from ggxref import _special, stable
+from ggxref._matrix import reciprocal_scale
 from ggxref._types import Real, Scalar, Turn, Vec2, Vec3
 
 
@@ -146,3 +147,20 @@ def unstretch(x: Scalar, y: Scalar, z: Scalar, alpha: Vec2) -> Vec3:
     dupuy2023 listing 1, line 8 (which warps the incident direction instead of the normal: a misprint).
     """
     return stable.direction(alpha[0] * x, alpha[1] * y, z)
+
+
+def unturned(along: Scalar, across: Scalar, height: Scalar, wi: Vec3, alpha: Vec2) -> tuple[Scalar, Scalar, Scalar]:
+    r"""`unstretch` of the normal with these parts along the stretched $\omega_i$, across it and upwards; of any length.
+
+    Unstretched, the direction across is perpendicular to $\omega_i$'s own azimuth, whatever α is. Where its part is the larger one,
+    its length is what is held, not the height's: the same change of both would cancel.
+    """
+    scale = reciprocal_scale(jnp.maximum(jnp.abs(wi[0]), jnp.abs(wi[1])))
+    c, s = stable.azimuth(wi[0] * scale, wi[1] * scale)
+    cos_i, sin_i = stable.azimuth(alpha[0] * c, alpha[1] * s)
+    x, y = c / alpha[1], s / alpha[0]
+    width = 1 / stable.sqrt(x * x + y * y)
+    p, q = alpha[0] * cos_i * along, alpha[1] * sin_i * along
+    held, constant = p * p + q * q + height * height < (width * across) ** 2, lax.stop_gradient(width)
+    share, width = jnp.where(held, constant / width, 1), jnp.where(held, constant, width) * across
+    return share * p - s * width, share * q + c * width, share * height

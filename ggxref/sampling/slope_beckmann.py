@@ -11,7 +11,7 @@ from jax.scipy.special import erfc
 from ggxref import _special, stable
 from ggxref._matrix import reciprocal_scale
 from ggxref._types import Scalar, Vec2, Vec3
-from ggxref.sampling._sphere import unstretch
+from ggxref.sampling._sphere import unturned
 from ggxref.sampling._visible import pdf_beckmann as pdf
 
 __all__ = ["pdf", "sample"]
@@ -138,11 +138,5 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
     horizontal = (u[0] == 0) | (u[1] == 0)
     along = jnp.where(horizontal, (u[0] == 0).astype(s.dtype), along)
     across = jnp.where(horizontal, (u[1] == 0).astype(s.dtype), across)
-    cos_i, sin_i = stable.azimuth(x, y)
     # `along` and `across` are the negated slopes, which are the normal's own components.
-    return unstretch(
-        cos_i * along - sin_i * across,
-        sin_i * along + cos_i * across,
-        jnp.where(horizontal, 0, 1).astype(s.dtype),
-        alpha,
-    )
+    return stable.direction(*unturned(along, across, jnp.where(horizontal, 0, 1).astype(s.dtype), wi, alpha))

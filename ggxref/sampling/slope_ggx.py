@@ -10,7 +10,7 @@ from ggxref._matrix import length, reciprocal_scale
 from ggxref._pairs import choice, less, minus, one_pass, product, rounded, scaled, square_root, sum_by_squares, total
 from ggxref._types import Vec2, Vec3
 from ggxref.sampling._ellipsoid import ray, shortened
-from ggxref.sampling._sphere import unstretch
+from ggxref.sampling._sphere import unturned
 from ggxref.sampling._visible import pdf_ggx as pdf
 
 __all__ = ["pdf", "sample"]
@@ -30,17 +30,41 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2) -> Vec3:
 
     heitz2014 (10)–(13), algorithm 4 (whose authors' code fitted the second inverse, walter2014 §4.2).
     """
-    i = two_product(alpha[0], wi[0]), two_product(alpha[1], wi[1]), (wi[2], jnp.zeros_like(wi[2]))
-    x, y, z = map(rounded, _point(u, shortened(i)[0]))
-    return unstretch(x, y, z, alpha)
+    return stable.direction(*_normal(u, wi, alpha))
 
 
 @jax.custom_jvp
-def _point(u, i):
-    """`_plain_point` in two words: for an anisotropic surface the turn to the azimuth of ω_i cancels.
+def _normal(u, wi, alpha):
+    """The micronormal, of any length, from two words: for an anisotropic surface the turn to the azimuth of ω_i cancels."""
+    i = two_product(alpha[0], wi[0]), two_product(alpha[1], wi[1]), (wi[2], jnp.zeros_like(wi[2]))
+    x, y, z = map(rounded, _point(u, shortened(i)[0]))
+    return alpha[0] * x, alpha[1] * y, z
 
-    - `i`: along the stretched ω_i, near 1.
-    """
+
+@_normal.defjvp
+def _normal_jvp(primals, tangents):
+    """A direction does not depend on the length of what it is made of, which is taken as constant."""
+    values = _normal(*primals)
+    plain, change = jax.jvp(_plain_normal, primals, tangents)
+    share = lax.stop_gradient(length(*values) / length(*plain))
+    return values, tuple(share * d for d in change)
+
+
+def _plain_normal(u, wi, alpha):
+    """`_normal` in one word."""
+    x, y, z = alpha[0] * wi[0], alpha[1] * wi[1], wi[2]
+    scale = reciprocal_scale(jnp.maximum(jnp.maximum(jnp.abs(x), jnp.abs(y)), jnp.abs(z)))
+    x, y, z = stable.turning(x * scale, y * scale, z * scale)
+    square = x * x + y * y
+    sin_psi, cos_psi, norm_square = _along(u[0], stable.sqrt(square), z, square)
+    upper = u[1] > 0.5
+    # In a loop of their own: each component that takes them would compute them again.
+    c, s = stable.one_loop(*_kepler.kepler(jnp.where(upper, 1 - u[1], u[1])))
+    return unturned(-sin_psi * s, norm_square * jnp.where(upper, -c, c), cos_psi * s, wi, alpha)
+
+
+def _point(u, i):
+    """The sphere-space normal, of any length. `i`: along the stretched ω_i, near 1."""
     one, zero = jnp.ones_like(u[0]), jnp.zeros_like(u[0])
     X, Y, S, flat, norm_square, rise, fall = one_pass(*ray(i, (one, zero)))
     sin_psi, cos_psi = one_pass(*_along_in_two_words(u[0], flat, i[2], norm_square, rise, fall))
@@ -59,39 +83,6 @@ def _along_in_two_words(u, flat, z, norm_square, rise, fall):
     squares = product(norm_square, product(lower, less(scaled(z, 2), lower)))
     cos_psi = sum_by_squares(product(cosine, z), product(sine, flat), squares)
     return less(product(sine, z), product(cosine, flat)), cos_psi
-
-
-@_point.defjvp
-def _point_jvp(primals, tangents):
-    """A direction does not depend on the length of what it is made of, which is taken as constant."""
-    (u, i), (du, di) = primals, tangents
-    values = _point(u, i)
-    plain, change = jax.jvp(_plain_point, (u, *(hi for hi, _ in i)), (du, *(d for d, _ in di)))
-    share = lax.stop_gradient(length(*(hi for hi, _ in values)) / length(*plain))
-    x, y, z = ((share * d, jnp.zeros_like(d)) for d in change)
-    return values, (x, y, z)
-
-
-def _plain_point(u, x, y, z):
-    """The sphere-space normal, of any length."""
-    x, y, z = stable.turning(x, y, z)
-    square = x * x + y * y
-    flat = stable.sqrt(square)
-    sin_psi, cos_psi, length = _along(u[0], flat, z, square)
-    upper = u[1] > 0.5
-    # In a loop of their own: each component that takes them would compute them again.
-    c, s = stable.one_loop(*_kepler.kepler(jnp.where(upper, 1 - u[1], u[1])))
-    along, across = -sin_psi * s, length * jnp.where(upper, -c, c)
-    cos_i, sin_i, one = _scaled_azimuth(x, y, flat)
-    return cos_i * along - sin_i * across, sin_i * along + cos_i * across, one * (cos_psi * s)
-
-
-def _scaled_azimuth(x, y, flat):
-    """Cosine, sine and 1, all times `flat` times a power of two: nothing is divided, and nothing underflows."""
-    pole, scale = flat <= 0, reciprocal_scale(flat)
-    x, y = jnp.where(pole, 1, x * scale), jnp.where(pole, 0, y * scale)
-    x, y, _ = stable.turning(x, y, jnp.zeros_like(x))
-    return x, y, jnp.where(pole, 1, lax.stop_gradient(flat) * scale)
 
 
 def _parts(u, flat, z, square):

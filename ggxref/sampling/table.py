@@ -19,7 +19,7 @@ from ggxref import _squares, stable
 from ggxref._errorfree import two_sum
 from ggxref._seen import turned_by
 from ggxref._types import Scalar, Vec2, Vec3
-from ggxref.sampling._sphere import incident, unstretch
+from ggxref.sampling._sphere import incident, unturned
 
 
 @jax.tree_util.register_dataclass
@@ -170,8 +170,7 @@ def sample(u: Vec2, wi: Vec3, alpha: Vec2, table: Table) -> Vec3:
     cos_psi, sin_psi = _cos_sin(psi, (low, high))
     cos_phi, sin_phi = _cos_sin(*_bilinear(table.phi, (low / math.pi, high / math.pi), _column(u[1])))
     along, across = -sin_psi * cos_phi, -sin_phi
-    cos_i, sin_i = stable.azimuth(i.x, i.y)
-    return unstretch(cos_i * along - sin_i * across, sin_i * along + cos_i * across, cos_psi * cos_phi, alpha)
+    return stable.direction(*unturned(along, across, cos_psi * cos_phi, wi, alpha))
 
 
 @stable.widened
