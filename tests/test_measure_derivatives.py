@@ -13,7 +13,7 @@ from ggxref.measure.accuracy import arguments, compiled
 from ggxref.measure.derivatives import blocks, half_ulp, jacobian, measure, points, proof, worst_corner
 from ggxref.measure.regions import rounded
 from ggxref.measure.tables import DRAWS, library
-from ggxref.sampling import ellipsoid_bounded, lune, slope_beckmann
+from ggxref.sampling import _sphere, ellipsoid_bounded, lune, slope_beckmann
 
 COUNT = 512
 LIMIT = 1e-4
@@ -130,6 +130,38 @@ def _jacobians(name, *args):
             given = [np.asarray(a, np.float32).astype(dtype) for a in args]
             found.append(np.asarray(jax.jit(jax.jacrev(library(name), 1))(*given), np.float64))
     return found
+
+
+def turned_and_unstretched(along, across, height, wi, alpha):
+    """`unturned` as it is defined."""
+    cos_i, sin_i = stable.azimuth(alpha[0] * wi[0], alpha[1] * wi[1])
+    x, y = cos_i * along - sin_i * across, sin_i * along + cos_i * across
+    return _sphere.unstretch(x, y, height, alpha)
+
+
+def test_the_direction_across_does_not_depend_on_alpha():
+    """As it is defined, that cancels: the normal's derivatives by α in float32 then lose their digits."""
+    rng = np.random.default_rng(11)
+    parts = np.stack([rng.uniform(-1e-2, 1e-2, 256), np.ones(256), 10.0 ** rng.uniform(-5, -1, 256)])
+    azimuth, height = rng.uniform(0, 2 * np.pi, 256), 10.0 ** rng.uniform(-3, -1, 256)
+    wi = np.stack([np.cos(azimuth), np.sin(azimuth), height]) / np.hypot(1, height)
+    given = [a.astype(np.float32) for a in (*parts, wi, 10.0 ** rng.uniform(-3, 1, (2, 256)))]
+
+    def by_alpha(function, dtype):
+        with jax.enable_x64(True):
+            rows = jax.jit(jax.vmap(jax.jacrev(function, 4), in_axes=-1))(*(a.astype(dtype) for a in given))
+            return np.asarray(rows, np.float64)
+
+    def miss(found):
+        return (np.linalg.norm(found - expected, axis=1) / np.linalg.norm(expected, axis=1)).max()
+
+    def ours(*args):
+        return stable.direction(*_sphere.unturned(*args))
+
+    expected = by_alpha(turned_and_unstretched, np.float64)
+    assert miss(by_alpha(ours, np.float64)) < 1e-10
+    assert miss(by_alpha(ours, np.float32)) < LIMIT
+    assert miss(by_alpha(turned_and_unstretched, np.float32)) > LIMIT
 
 
 def test_points_beside_the_rim_of_the_disk_turn_by_little():

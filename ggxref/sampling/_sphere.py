@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from ggxref import _special, stable
-from ggxref._matrix import reciprocal_scale
+from ggxref._matrix import length, reciprocal_scale
 from ggxref._types import Real, Scalar, Turn, Vec2, Vec3
 
 
@@ -149,18 +149,48 @@ def unstretch(x: Scalar, y: Scalar, z: Scalar, alpha: Vec2) -> Vec3:
     return stable.direction(alpha[0] * x, alpha[1] * y, z)
 
 
+@jax.custom_jvp
+def _stretched(c: Scalar, s: Scalar, alpha: Vec2) -> tuple[Scalar, Scalar, Scalar, Scalar]:
+    """Of the azimuth with cosine c and sine s, the stretched one's cosine and sine; the cosine times αy and the sine times αx."""
+    cosine, sine = stable.azimuth(alpha[0] * c, alpha[1] * s)
+    return cosine, sine, alpha[1] * cosine, alpha[0] * sine
+
+
+@_stretched.defjvp
+def _stretched_jvp(primals, tangents):
+    """The two products lie along (c, s): by α both change by the same share, in which that of the factors would cancel."""
+    (c, s, alpha), (dc, ds, dalpha) = primals, tangents
+    cosine, sine, to_y, to_x = values = _stretched(*primals)
+    by_x, by_y = dalpha[0] / alpha[0], dalpha[1] / alpha[1]
+    share = sine * sine * by_x + cosine * cosine * by_y
+    swing = (c * ds - s * dc) * (alpha[0] * alpha[1] / ((alpha[0] * c) ** 2 + (alpha[1] * s) ** 2))
+    turn = swing + cosine * sine * (by_y - by_x)
+    changes = (
+        -sine * turn,
+        cosine * turn,
+        share * to_y - alpha[1] * sine * swing,
+        share * to_x + alpha[0] * cosine * swing,
+    )
+    return values, changes
+
+
 def unturned(along: Scalar, across: Scalar, height: Scalar, wi: Vec3, alpha: Vec2) -> tuple[Scalar, Scalar, Scalar]:
     r"""`unstretch` of the normal with these parts along the stretched $\omega_i$, across it and upwards; of any length.
 
     Unstretched, the direction across is perpendicular to $\omega_i$'s own azimuth, whatever α is. Where its part is the larger one,
     its length is what is held, not the height's: the same change of both would cancel.
     """
-    scale = reciprocal_scale(jnp.maximum(jnp.abs(wi[0]), jnp.abs(wi[1])))
-    c, s = stable.azimuth(wi[0] * scale, wi[1] * scale)
-    cos_i, sin_i = stable.azimuth(alpha[0] * c, alpha[1] * s)
-    x, y = c / alpha[1], s / alpha[0]
-    width = 1 / stable.sqrt(x * x + y * y)
-    p, q = alpha[0] * cos_i * along, alpha[1] * sin_i * along
-    held, constant = p * p + q * q + height * height < (width * across) ** 2, lax.stop_gradient(width)
-    share, width = jnp.where(held, constant / width, 1), jnp.where(held, constant, width) * across
-    return share * p - s * width, share * q + c * width, share * height
+    flat = jnp.maximum(jnp.abs(wi[0]), jnp.abs(wi[1]))
+    x, y = wi[0] * reciprocal_scale(flat), wi[1] * reciprocal_scale(flat)
+    # Beside the pole the derivative, 1/flat, is soon beyond the range; as at the pole, it is 0 then.
+    pole = flat * flat == 0
+    c, s = stable.azimuth(*(jnp.where(pole, lax.stop_gradient(k), k) for k in (x, y)))
+    cos_i, sin_i, to_y, to_x = _stretched(c, s, alpha)
+    x, y = alpha[0] * cos_i, alpha[1] * sin_i
+    over_width = length(c / alpha[1], s / alpha[0], 0)
+    width = lax.stop_gradient(1 / over_width)
+    held = (x * x + y * y) * along**2 + height * height < (width * across) ** 2
+    share = jnp.where(held, width * over_width, 1)
+    along, height = share * along, share * height
+    to_x, to_y = jnp.where(held, s * width, to_x), jnp.where(held, c * width, to_y)
+    return x * along - to_x * across, y * along + to_y * across, height
