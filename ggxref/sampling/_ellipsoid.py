@@ -54,11 +54,16 @@ def ray(i: Pairs, pole: Two) -> tuple[Pair, ...]:
 
 
 def risen(p: Pairs, A: Canonical) -> Pairs:
-    """The point, as if its height were constant where most of the normal is that height times (ex, ey, 1)."""
+    """The point, as if its height were constant where most of the normal is that height times (ex, ey, 1), and its x where most
+    is x times (c00, c10, 0).
+    """
     (x, x_rest), (y, y_rest), (z, z_rest) = p
     c00, c10, c11, ex, ey = A
-    across = (c00 + jnp.abs(c10) + c11) * (jnp.abs(x) + jnp.abs(y))
-    x, y, z = stable.rising(jnp.abs(z) * (1 + jnp.abs(ex) + jnp.abs(ey)) > across, x, y, z)
+    by_x, by_y = (c00 + jnp.abs(c10)) * jnp.abs(x), c11 * jnp.abs(y)
+    by_z = (1 + jnp.abs(ex) + jnp.abs(ey)) * jnp.abs(z)
+    high = by_z > by_x + by_y
+    x, y, z = stable.rising(high, x, y, z)
+    y, z, x = stable.rising(~high & (by_x > by_y + by_z), y, z, x)
     return (x, x_rest), (y, y_rest), (z, z_rest)
 
 
