@@ -122,6 +122,24 @@ def test_samples_beside_the_azimuth_of_the_larger_roughness():
     assert measure(name, library(name), ("u", "wi", "alpha"), "ordinals", 4096).worst < 5e-5
 
 
+def test_samples_perpendicular_to_the_incident_direction_are_so_for_every_alpha():
+    """At the disk's far rim the larger alpha changes hardly more than their length before it is divided by: 3e-3 if not left out."""
+    rng = np.random.default_rng(13)
+    u = np.stack([rng.uniform(0.05, 0.45, 4096), 1 - 10.0 ** rng.uniform(-6, -3, 4096)])
+    azimuth, height = rng.uniform(0.5, 1.5, 4096), rng.uniform(0.3, 0.9, 4096)
+    wi = np.stack([np.cos(azimuth), np.sin(azimuth), height]) / np.hypot(1, height)
+    alpha = np.stack([10.0 ** rng.uniform(-4, -3, 4096), rng.uniform(0.5, 5, 4096)])
+    given = [x.astype(np.float32) for x in (u, wi, alpha)]
+    by_alpha = jax.vmap(jax.jacrev(library("sampling.cross_section.sample"), 2), in_axes=-1)
+    found = []
+    for dtype in (np.float32, np.float64):
+        with jax.enable_x64(True):
+            found.append(np.asarray(jax.jit(by_alpha)(*(x.astype(dtype) for x in given))[..., 1], np.float64))
+    single, exact = found
+    miss = np.linalg.norm(single - exact, axis=1) / np.linalg.norm(exact, axis=1)
+    assert miss.max() < LIMIT
+
+
 def _jacobians(name, *args):
     """By the second argument, in float32 and in float64, at the same numbers."""
     found = []

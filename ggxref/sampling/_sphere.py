@@ -121,22 +121,31 @@ def _crescent(along: Scalar, rim: Scalar, i: Incident, sin_theta: Scalar) -> tup
     return lifted * sin_theta - moved * i.z, z
 
 
+def sinking(along: Scalar, rim: Scalar, i: Incident, sin_theta: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
+    """The share of i's sinking by which the crescent's point turns about the axis across, and what is left of 1; the point's
+    coordinates along `i` and towards the pole.
+
+    What is left is (below_rim/2) sin_theta/lifted, which near the rim may be nearly all. Of `lifted` and (below_rim/2) sin_theta,
+    the squares differ by (i.rise/2) rim.
+    """
+    _, below_rim, _, moved, lifted = _lifted(along, rim, i)
+    sunk, divisor = below_rim * sin_theta / 2, jnp.where(lifted > 0, lifted, 1)
+    # By one quotient after the other: of their product, the second derivatives have the square.
+    share = jnp.where(lifted > 0, i.rise / 2 * rim, 0) / divisor / jnp.where(lifted > 0, lifted + sunk, 1)
+    return share, jnp.where(lifted > 0, sunk, 1) / divisor, lifted, moved
+
+
 crescent = jax.custom_jvp(_crescent)
 
 
 @crescent.defjvp
 def _crescent_jvp(primals, tangents):
-    """Where `i` sinks by an angle, the point turns about the axis across by it less (below_rim/2) sin_theta/lifted of it, which near
-    the rim is nearly all. Of `lifted` and (below_rim/2) sin_theta, the squares differ by (i.rise/2) rim.
-    """
+    """Where `i` sinks by an angle, the point turns about the axis across by a share of it."""
     along, rim, i, sin_theta = primals
     dalong, drim, di, dsin_theta = tangents
     by_disk = jax.jvp(lambda along, rim: _crescent(along, rim, i, sin_theta), (along, rim), (dalong, drim))
     (outward, z), (doutward, dz) = by_disk
-    _, below_rim, _, _, lifted = _lifted(along, rim, i)
-    # By one quotient after the other: of their product, the second derivatives have the square.
-    share = jnp.where(lifted > 0, i.rise / 2 * rim, 0) / jnp.where(lifted > 0, lifted, 1)
-    share = share / jnp.where(lifted > 0, lifted + below_rim * sin_theta / 2, 1)
+    share, *_ = sinking(along, rim, i, sin_theta)
     turn = share * (i.z * dsin_theta - sin_theta * di.z)
     return (outward, z), (doutward + z * turn, dz - outward * turn)
 
