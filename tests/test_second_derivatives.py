@@ -12,8 +12,9 @@ RNG = np.random.default_rng(3)
 U = RNG.uniform(0.1, 0.9, 2)
 TILTS = [(tilt, sign) for tilt in (1e-6, 1e-12) for sign in (1, -1)]
 ALPHAS = [(1e-4, 1e-4), (1e-4, 0.3), (1.0, 1.0)]
-# Beside the nadir of a smooth surface the crescent's own width, α² tilt², leaves the range.
-POINTS = [(tilt, sign, alpha) for tilt, sign in TILTS for alpha in ALPHAS if sign > 0 or tilt * max(alpha) > 1e-15]
+POINTS = [(tilt, sign, alpha) for tilt, sign in TILTS for alpha in ALPHAS]
+# Beside the nadir of a smooth surface, where the crescent's own width is α² tilt², by alpha two digits are left.
+EXACT = np.array([sign > 0 or tilt * max(alpha) > 1e-15 for tilt, sign, alpha in POINTS])
 WEIGHTS = (0.3, -0.7, 1.1)
 # Of the largest number of each block. Measured at most 5e-5, along the longer axis of an anisotropic surface.
 LIMIT = 1e-3
@@ -40,7 +41,7 @@ def test_finite_and_those_of_float64(name):
     for found, expected in zip(blocks(name, np.float32), blocks(name, np.float64), strict=True):
         assert np.isfinite(found).all()
         miss, size = np.abs(found - expected).max(1), np.abs(expected).max(1)
-        assert np.all(miss <= LIMIT * size), (miss / size).max()
+        assert np.all((miss <= LIMIT * size)[EXACT]), (miss / size)[EXACT].max()
 
 
 SECOND_BY_WI = {

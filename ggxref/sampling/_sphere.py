@@ -117,7 +117,9 @@ def _crescent(along: Scalar, rim: Scalar, i: Incident, sin_theta: Scalar) -> tup
     plus, minus = lifted * i.z, moved * sin_theta
     differ = ((plus > 0) & (minus < 0)) | ((plus < 0) & (minus > 0))
     conjugate = jnp.where(differ, plus - minus, 1)
-    z = jnp.where(differ, i.rise / 2 * above_rim * (half_chord * i.z - moved) / conjugate, plus + minus)
+    scale = reciprocal_scale(conjugate)  # of its second derivatives, the divisor is the cube
+    z = scale * (i.rise / 2 * above_rim * (half_chord * i.z - moved)) / (scale * conjugate)
+    z = jnp.where(differ, z, plus + minus)
     return lifted * sin_theta - moved * i.z, z
 
 

@@ -43,10 +43,8 @@ def _micronormal_jvp(primals, tangents):
     # By ω_i: as the stretched one sinks, and as it turns about the pole.
     share, rest, by_i, by_pole = sinking(along, rim, i, sin_theta)
     p, q, dp, dq = ax * wi[0], ay * wi[1], ax * dwi[0], ay * dwi[1]
-    norm, size = (
-        length(p, q, wi[2]),
-        length(p, q, 0),
-    )  # no squares, whose squares are divisors of the second derivatives
+    # Not their squares, whose squares are divisors of the second derivatives.
+    norm, size = length(p, q, wi[2]), length(p, q, 0)
     sink = share * (i.z * (c * dp + s * dq) - sin_theta * dwi[2]) / jnp.where(norm > 0, norm, 1)
     turn = jnp.where(size > 0, c * dq - s * dp, 0) / jnp.where(size > 0, size, 1)
     do, da, dz = do + z * sink - a * turn, da + o * turn, dz - o * sink
