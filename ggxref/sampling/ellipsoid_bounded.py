@@ -118,6 +118,7 @@ def pdf(wm: Vec3, wi: Vec3, A: Mat3) -> Scalar:
     """
     A, _ = near_one(A)
     terms = canonical_terms(A)
+    wi = jnp.stack(stable.turning(*wi))  # the quotient does not depend on its length
     one = jnp.ones_like(wi[2])
     rise = area_ggx(_rounded_to_sphere(wi, terms), (one, one), 1)
     cosine, cut = stable.cosine(wi, wm), _cut(wi, terms)
